@@ -8,6 +8,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from accelstudy.adjustment.quality import Solution
 from accelstudy.approaches import Approach
 from accelstudy.basics.wording import words
 from accelstudy.campaign.session import Campaign
@@ -19,7 +20,6 @@ from accelstudy.diagnosis.evidence.noise_tests import LEVEL as LEVEL_OF_NOISE
 from accelstudy.diagnosis.evidence.sets import weigh_sets
 from accelstudy.diagnosis.evidence.size import Evidence, Level
 from accelstudy.diagnosis.rules import RULES
-from accelstudy.diagnosis.space.frame import SessionFit
 from accelstudy.lots.noise import NoisePrior
 from accelstudy.sensors.sensor import SensorModel
 
@@ -52,7 +52,7 @@ class SensorEvidence:
     redundancy : int, of these
     variance : float, (m/s²)², of a position mean, by the noise of the lot and the residuals
     unit : float, variance of unit weight; 1 by the noise of the lot
-    frame : SessionFit, the campaign; None where it does not determine the model
+    solution : Solution, of the campaign; None where it does not determine the model
     """
 
     campaign: str
@@ -67,7 +67,7 @@ class SensorEvidence:
     redundancy: int = 0
     variance: float = 1.0
     unit: float = 1.0
-    frame: SessionFit | None = None
+    solution: Solution | None = None
 
 
 @dataclass(frozen=True, eq=False)
@@ -164,7 +164,7 @@ def _weighed(sensor: Sensor) -> SensorEvidence:
         redundancy=residuals.redundancy,
         variance=problem.base.sigma**2 * of_unit_weight,
         unit=of_unit_weight if noise is None else 1.0,
-        frame=problem.frame,
+        solution=problem.frame.solution,
     )
 
 

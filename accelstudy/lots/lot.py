@@ -56,9 +56,9 @@ class LotDiagnosis:
     explained: bool = True
 
     @property
-    def sensors(self) -> tuple[Sensor, ...]:
+    def last(self) -> Pass:
         """Sensors with all that was found in their models, and their noise by that of the lot."""
-        return self.passes[-1].sensors
+        return self.passes[-1]
 
     @property
     def evidence(self) -> tuple[SensorEvidence, ...]:
@@ -91,26 +91,15 @@ class LotDiagnosis:
         return next((one for one in self.passes if one.missing), self.passes[-1]).alternatives
 
     @property
-    def odd(self) -> list[SensorState]:
-        """Odd sensors, with all that was found in the model; the surest first."""
-        return self.passes[-1].odd
-
-    @property
-    def usual(self) -> list[int]:
-        """Numbers of the sensors that are not odd."""
-        return self.passes[-1].usual
-
-    @property
     def each(self) -> list[SensorState]:
         """Names of what the model lacks for each sensor, and their posterior."""
         told = {found.names[0] for found in self.effects}
-        kept = [told] * (len(self.passes) - 1) + [told | {ODD}]
         rows = []
         for states in zip(*(one.each for one in self.passes), strict=True):
-            each = zip(states, kept, strict=True)
-            names = tuple(name for state, some in each for name in state.names if name in some)
+            names = [name for state in states for name in state.names if name in told]
+            names += [name for name in states[-1].names if name == ODD]
             probability = math.prod(state.posterior for state in states)
-            rows.append(SensorState(states[0].campaign, names, probability))
+            rows.append(SensorState(states[0].campaign, tuple(names), probability))
         return rows
 
 

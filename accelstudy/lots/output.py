@@ -93,7 +93,7 @@ class Lot(Result):
         left_out: Mapping[str, str],
     ) -> None:
         self.diagnosis, self.model, self.fits, self.left_out = diagnosis, model, fits, left_out
-        self.name = f"{len(diagnosis.sensors)} sensors"
+        self.name = f"{len(diagnosis.last.sensors)} sensors"
 
     @classmethod
     def of(
@@ -137,7 +137,7 @@ class Lot(Result):
             say(f"not in the lot: {name}: {why.removeprefix(f'{name}: ')}")
         diagnosis = weigh_lot(usable, model, approach, seed, cores)
         fits = list[CampaignFit | InputError]()
-        for i, sensor in enumerate(diagnosis.sensors):
+        for i, sensor in enumerate(diagnosis.last.sensors):
             try:
                 fits.append(fit_campaign(sensor.campaign, diagnosis.model_of(i), sensor.approach))
             except InputError as error:
@@ -153,7 +153,7 @@ class Lot(Result):
     @property
     def usual(self) -> dict[int, CampaignFit]:
         """Calibrations of the sensors that are not odd, by their numbers."""
-        return {i: self.fitted[i] for i in self.diagnosis.usual if i in self.fitted}
+        return {i: self.fitted[i] for i in self.diagnosis.last.usual if i in self.fitted}
 
     @property
     def calibrations(self) -> dict[str, Calibration]:
@@ -169,7 +169,7 @@ class Lot(Result):
         values, sigmas = np.full((2, n, model.n_parameters), np.nan)
         for i, fit in self.fitted.items():
             values[i], sigmas[i] = fit.parameters, np.sqrt(self._variances(i, fit))
-        usual = np.isin(np.arange(n), diagnosis.usual)
+        usual = np.isin(np.arange(n), diagnosis.last.usual)
         has = dict.fromkeys(model.parameter_names, np.ones(n, dtype=bool))
         for found in diagnosis.effects:
             having = np.array([found.names[0] in one.names for one in each])
@@ -189,7 +189,7 @@ class Lot(Result):
         Its own estimate has few degrees of freedom: taken as it is, what is not known of the noise
         would look like scatter of the parameters.
         """
-        own, noise = fit.sigma**2, self.diagnosis.sensors[i].noise
+        own, noise = fit.sigma**2, self.diagnosis.last.sensors[i].noise
         if fit.trusts_sigma or noise is None:
             return own
         r, ratio = fit.adjustment.redundancy, (noise.sigma / fit.sigma_position_posteriori) ** 2
@@ -241,7 +241,7 @@ class Lot(Result):
         d, tilt = self.diagnosis, self.tilt
         content: dict[str, Any] = json_content({
             "schema_version": 1,
-            "sensors": len(d.sensors),
+            "sensors": len(d.last.sensors),
             "anything": {"p_value": d.p_value, "missing": d.missing, "level": LEVEL},
             "effects": [
                 {**found._asdict(), "parameters": [one.content for one in self._sizes(found)]}
@@ -252,7 +252,7 @@ class Lot(Result):
             "alternatives": [{"names": n, "posterior": p} for n, p in d.alternatives],
             "odd": [
                 {**one._asdict(), "reason": f"it shows {_either(one.names)}, and the others do not"}
-                for one in d.odd
+                for one in d.last.odd
             ],
             "each": [
                 {**one._asdict(), "failed": str(fit) if isinstance(fit, InputError) else None}
@@ -295,7 +295,7 @@ class Lot(Result):
             write_json(its_own / "calibration.json", Calibration(fit).content)
         steps = []
         if write_type(self, folder):
-            of_type, approach = place / TYPE_FILE, self.diagnosis.sensors[0].approach
+            of_type, approach = place / TYPE_FILE, self.diagnosis.last.sensors[0].approach
             command = suggestions.calibrate("CAMPAIGN", of_type, approach.name, of_type)
             steps.append(("Calibrate the next sensor of the type, with what these tell", command))
         write_page(

@@ -27,7 +27,6 @@ from accelstudy.lots.sizes import (
     Names,
     PooledEffect,
     TypeSizes,
-    TypicalSet,
     most_likely,
     weigh_pooled,
 )
@@ -135,8 +134,8 @@ class Pass:
             anything.add(one.tested)
             said.append(replace(one, tested={}))
         # Nor are the fits, so that memory hardly follows the number of sensors.
-        now = cls(tuple(sensors), tuple(replace(one, frame=None) for one in said), anything)
-        usual = [i for i in now.usual if said[i].frame]
+        now = cls(tuple(sensors), tuple(replace(one, solution=None) for one in said), anything)
+        usual = [i for i in now.usual if said[i].solution]
         their = [said[i] for i in usual]
         seed = sensors[0].seed - 1 if sensors[0].seed else n
         mean = _evidence_of_mean([sensors[i] for i in usual], their, whole, seed)
@@ -145,7 +144,7 @@ class Pass:
         specs = {name: now.shapes[name] for names in asked for name in names}
         if len(usual) < 2 or not specs:
             return now
-        each = [Equations.of(one.frame, specs.values()) for one in said]
+        each = [Equations.of(one.solution, specs.values()) for one in said]
         redundancy = sum(one.redundancy for one in their)
         return replace(now, sizes=TypeSizes.of(each, specs, asked, usual, redundancy))
 
@@ -154,11 +153,6 @@ class Pass:
         """Classes of names that mean the same in this lot, by the first of each."""
         of_mean = {} if self.mean is None else {COMMON: (COMMON,)}
         return lot_classes(self.evidence) | of_mean
-
-    @cached_property
-    def _stands(self) -> dict[str, str]:
-        """First name of the class of each name."""
-        return {name: first for first, members in self.classes.items() for name in members}
 
     @cached_property
     def mixture(self) -> Mixture:
@@ -170,14 +164,21 @@ class Pass:
             ])
             for name in self.classes
         }  # fmt: skip
+        first = {name: one for one, members in self.classes.items() for name in members}
         pairs: dict[Names, Array] = {}
         for i, one in enumerate(self.evidence):
-            for names, log in self._pairs(one).items():
-                if names not in pairs:
-                    # Of a sensor without odds of both they are as where none has any (`Mixture`).
-                    pairs[names] = np.min([odds[name] for name in names], axis=0)
-                pairs[names][i] = log
-        kinds = {name: _kind(name) for name in self.classes}
+            for both, log in one.pairs.items():
+                names = tuple(sorted({first[name] for name in both if name in first}))
+                if len(names) == 2:
+                    told = pairs.setdefault(names, np.full(len(self.evidence), -np.inf))
+                    told[i] = max(log, told[i])
+        for names, told in pairs.items():
+            # Of a sensor without odds of both they are as where none has any (`Mixture`).
+            weaker = np.min([odds[name] for name in names], axis=0)
+            np.copyto(told, weaker, where=np.isneginf(told))
+        # Names of one kind share its weight evenly.
+        usual = {n: UNKNOWN if n.startswith(UNKNOWN) else EFFECT for n in self.classes}
+        kinds = {name: name if name in WEIGHTS else kind for name, kind in usual.items()}
         counts = Counter(kinds.values())
         total = sum(WEIGHTS[kind] for kind in counts)
         prior = {name: WEIGHTS[kind] / counts[kind] / total for name, kind in kinds.items()}
@@ -186,18 +187,13 @@ class Pass:
             common |= {(n,): log for n, log in mean.odds.items() if n.startswith(UNKNOWN)}
             # What is larger than noise in the mean is no noise.
             common[COMMON,] = mean.odds[LEVEL_OF_NOISE]
-        return Mixture(odds, pairs, prior, common, self._typical)
-
-    @property
-    def _typical(self) -> dict[Names, list[TypicalSet]]:
-        """Odds with sizes of the type, of what more than few sensors have."""
-        sets = {} if self.sizes is None else self.sizes.sets
-        n = len(self.sensors)
-        return {
+        sets, n = {} if self.sizes is None else self.sizes.sets, len(self.sensors)
+        typical = {
             names: alike
             for names, alike in sets.items()
             if min(most_likely(alike).shares.values()) * n > self._few
         }
+        return Mixture(odds, pairs, prior, common, typical)
 
     @cached_property
     def shapes(self) -> dict[str, str]:
@@ -210,15 +206,6 @@ class Pass:
         best = [*self.mixture.sets][:MAX_SETS]
         sets = dict.fromkeys([*((name,) for names in best for name in names), *best])
         return [s for s in sets if 0 < len(s) < 3 and all(name in self.shapes for name in s)]
-
-    def _pairs(self, one: SensorEvidence) -> dict[Names, float]:
-        """Log odds of two classes together."""
-        pairs: dict[Names, float] = {}
-        for both, log in one.pairs.items():
-            names = tuple(sorted({self._stands[name] for name in both if name in self._stands}))
-            if len(names) == 2:
-                pairs[names] = max(log, pairs.get(names, -np.inf))
-        return pairs
 
     @cached_property
     def p_value(self) -> float:
@@ -289,13 +276,9 @@ class Pass:
     @cached_property
     def _rare(self) -> set[str]:
         """Classes that few sensors have, if the lot has them."""
-        surely = {
-            name: np.sum(
-                self.mixture.having(name) > MIN_HAVING * max(self.mixture.of_any([name]), 1e-300)
-            )
-            for name in self.classes
-        }
-        return {name for name, count in surely.items() if count <= self._few}
+        mixture = self.mixture
+        least = {name: MIN_HAVING * max(mixture.of_any([name]), 1e-300) for name in self.classes}
+        return {n for n, p in least.items() if np.sum(mixture.having(n) > p) <= self._few}
 
     @property
     def _few(self) -> float:
@@ -327,16 +310,13 @@ class Pass:
         order = np.argsort(-np.round(alone, 3), kind="stable")
         wrong = np.cumsum(1 - alone[order]) / np.arange(1, len(alone) + 1)
         known = {one.names[0] for one in self.found}
-        own = {
-            name: self.mixture.odds[name] + np.log(prior)
-            for name, prior in self.mixture.prior.items()
-            if name not in known
-        }
-        told = []
-        for i in order[: int(np.sum(wrong <= FALSE_ODD))]:
-            name = max(own, key=lambda name: own[name][i])
-            told.append(SensorState(self.evidence[i].campaign, self.classes[name], float(alone[i])))
-        return told
+        prior = {name: p for name, p in self.mixture.prior.items() if name not in known}
+        own = np.array([self.mixture.odds[name] + np.log(p) for name, p in prior.items()])
+        classes = [self.classes[name] for name in prior]
+        return [
+            SensorState(self.evidence[i].campaign, classes[own[:, i].argmax()], float(alone[i]))
+            for i in order[: int(np.sum(wrong <= FALSE_ODD))]
+        ]
 
     @property
     def usual(self) -> list[int]:
@@ -363,25 +343,19 @@ class Pass:
     def each(self) -> list[SensorState]:
         """Names of what the model lacks for each sensor, and their posterior."""
         of_sets, odd = self.mixture.sensors
-        of_names = {
-            tuple(name for name in self.classes if name in names): p for names, p in of_sets.items()
-        }
-        sets, table = [*of_names, (ODD,)], np.array([*of_names.values(), odd])
-        best = table.argmax(axis=0)
-        return [
-            SensorState(one.campaign, sets[k], float(table[k, i]))
-            for i, (one, k) in enumerate(zip(self.evidence, best, strict=True))
-        ]
+        sets = [tuple(n for n in self.classes if n in names) for names in of_sets] + [(ODD,)]
+        each = zip(self.evidence, np.array([*of_sets.values(), odd]).T, strict=True)
+        return [SensorState(one.campaign, sets[int(p.argmax())], float(p.max())) for one, p in each]
 
     def spec(self, name: str) -> str | None:
         """Return an effect in the setting that explains most; None of what is no effect."""
         if self.sizes is not None and name in self.sizes.specs:
             return self.sizes.specs[name]
-        counted: dict[str, float] = {}
+        counted = Counter[str]()
         for one, weight in zip(self.evidence, self.mixture.having(name).tolist(), strict=True):
-            if (spec := one.specs.get(name)) is not None:
-                counted[spec] = counted.get(spec, 0.0) + weight
-        return max(counted, key=lambda spec: counted[spec], default=None)
+            if name in one.specs:
+                counted[one.specs[name]] += weight
+        return max(counted, key=counted.__getitem__, default=None)
 
 
 def _pooled(used: Sequence[SensorEvidence]) -> dict[str, PooledEffect]:
@@ -397,7 +371,7 @@ def _pooled(used: Sequence[SensorEvidence]) -> dict[str, PooledEffect]:
     if not shapes:
         return {}
     specs = [spec for one in shapes.values() for spec in one]
-    pooled = reduce(add, (Equations.of(each.frame, specs, each.unit) for each in used))
+    pooled = reduce(add, (Equations.of(each.solution, specs, each.unit) for each in used))
     return weigh_pooled(pooled, sum(each.redundancy for each in used), shapes)
 
 
@@ -411,10 +385,3 @@ def _evidence_of_mean(
     with suppress(InputError):  # the positions do not determine the model
         return replace(mean, model=whole, seed=seed).evidence()
     return None
-
-
-def _kind(name: str) -> str:
-    """Key of `WEIGHTS` for a name; names of one kind share that weight evenly."""
-    if name in WEIGHTS:
-        return name
-    return UNKNOWN if name.startswith(UNKNOWN) else EFFECT

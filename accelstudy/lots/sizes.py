@@ -24,6 +24,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from accelstudy.adjustment.quality import Solution
 from accelstudy.basics.errors import InputError
 from accelstudy.diagnosis.evidence.size import SIZE_WEIGHTS, SIZES, Evidence, Level, log_mean
 from accelstudy.diagnosis.rules import RULES
@@ -67,29 +68,29 @@ class Equations(NamedTuple):
     square: float
 
     @classmethod
-    def of(cls, frame: SessionFit | None, specs: Iterable[str], variance: float = 1.0) -> Equations:
+    def of(cls, solution: Solution | None, specs: Iterable[str], unit: float = 1.0) -> Equations:
         """Equations of effects by a campaign; zeros where it cannot show one.
 
         Parameters
         ----------
-        frame : SessionFit, of the campaign; None for one that shows nothing
+        solution : Solution, of the campaign; None for one that shows nothing
         specs : the effects
-        variance : float, of unit weight
+        unit : float, variance of unit weight
         """
         effects = [get_effect(spec) for spec in specs]
         k = [len(effect.parameters) for effect in effects]
-        if frame is None:
+        if solution is None:
             return cls(np.zeros((sum(k), sum(k))), np.zeros(sum(k)), np.zeros(sum(k)), 0.0)
-        residuals, columns = frame.residuals, []
+        frame, columns = SessionFit.of(solution), list[Array]()
         for effect, count in zip(effects, k, strict=True):
             try:
                 columns.append(frame.rows(effect))
             except InputError:  # a column is absent
-                columns.append(np.zeros((len(residuals.z), count)))
-        rows, z = np.concatenate(columns, axis=1), residuals.z
-        d = residuals.project(rows)
+                columns.append(np.zeros((len(frame.residuals.z), count)))
+        rows, z = np.concatenate(columns, axis=1), frame.residuals.z
+        d = frame.residuals.project(rows)
         normal, right, squares = d.T @ d, d.T @ z, np.sum(rows**2, axis=0)
-        return cls(normal / variance, right / variance, squares / variance, float(z @ z) / variance)
+        return cls(normal / unit, right / unit, squares / unit, float(z @ z) / unit)
 
     def __add__(self, other: tuple[Any, ...]) -> Equations:
         """Equations of both campaigns as one."""

@@ -164,7 +164,7 @@ def _typical(parameter: TypeParameter, sensors: int, stays: bool) -> TypicalPara
 def _sheet(lot: Lot, parameters: dict[str, TypicalParameter]) -> DataSheet:
     """Noise of a position mean, which is that of the median sensor, and errors when it is new."""
     title = f"{len(lot.usual)} sensors of a type"
-    sensors = lot.diagnosis.sensors
+    sensors = lot.diagnosis.last.sensors
     sigmas = [
         fit.sigma_position if (noise := sensors[i].noise) is None else noise.sigma
         for i, fit in lot.usual.items()

@@ -28,7 +28,7 @@ def test_a_campaign_that_does_not_determine_the_model_says_nothing():
     sensor = Sensor(campaign, None, get_approach("gravity"))
     silent = sensor.evidence()
     assert (silent.odds, silent.tested) == ({}, {})
-    none = Equations.of(silent.frame, ("thermal_bias",))
+    none = Equations.of(silent.solution, ("thermal_bias",))
     assert none.normal.shape == (3, 3)
     assert not none.normal.any()
 

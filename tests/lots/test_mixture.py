@@ -266,7 +266,7 @@ def test_what_the_lot_lacks_is_named_and_what_one_sensor_lacks_makes_it_odd():
     lot = LotDiagnosis((one, one), get_model("bias-scale"))
     assert lot.missing
     assert one.found == []
-    assert [(o.campaign, o.names) for o in lot.odd] == [("sensor 7", (NAMES[1],))]
+    assert [(o.campaign, o.names) for o in lot.last.odd] == [("sensor 7", (NAMES[1],))]
     assert [one.names for one in lot.each if one.names] == [("odd",)]
     # Without it the others are weighed as before, with the sizes of the type, too.
     true = np.zeros((20, 3))

@@ -49,7 +49,8 @@ def type_of(sensors, folder):
     fits = [fitted(one) for one in sensors]
     named = [SimpleNamespace(noise=NoisePrior(0.002, 200.0)) for _ in sensors]
     lot = SimpleNamespace(
-        usual=range(len(sensors)), sensors=named, each=(), effects=(), model=MODEL,
+        last=SimpleNamespace(usual=range(len(sensors)), sensors=named),
+        each=(), effects=(), model=MODEL,
     )  # fmt: skip
     assert write_type(Lot(lot, MODEL, fits, {}), folder)
     return folder / "type.yaml"
