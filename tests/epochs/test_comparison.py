@@ -26,15 +26,6 @@ def compare(first, second):
     return Comparison(first, second, 50 * GON)
 
 
-def test_a_robot_and_gravity_have_the_same_sensor_in_common():
-    """By gravity and by robot a noise-free sensor without a rotation is the same."""
-    by_gravity = calibrated(1, sigma=1e-9, robot_sigma=2e-11)
-    by_robot = calibrated(2, approach="robot", sigma=1e-9, robot_sigma=2e-11)
-    c = compare(by_gravity, by_robot)
-    np.testing.assert_allclose(*c.estimates, atol=1e-8)
-    assert c.tilt[0].max() < 1e-8
-
-
 def test_the_change_of_roll_and_pitch_is_that_of_readings():
     first = calibrated(1)
     second = calibrated(2, effects=("bias: 0.1, 0.07, -0.1", *SENSOR[1:]))

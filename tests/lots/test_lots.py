@@ -56,18 +56,6 @@ def test_the_scatter_of_a_type_is_found():
     assert np.isnan(over_sensors(np.full(3, np.nan), np.full(3, np.nan)).mean)
 
 
-def test_the_interval_of_a_scatter_holds_it():
-    """Fifty sensors whose sigmas are three times their scatter, as in the tutorial."""
-    rng = np.random.default_rng(8)
-    n, held, true = 400, 0, 0.03
-    for _ in range(n):
-        sigmas = rng.uniform(0.07, 0.13, 50)
-        values = 0.15 + true * rng.standard_normal(50) + sigmas * rng.standard_normal(50)
-        low, high = over_sensors(values, sigmas).scatter_ci95
-        held += low <= true <= high
-    assert held / n == pytest.approx(0.95, abs=STANDARD_ERRORS * np.sqrt(0.95 * 0.05 / n))
-
-
 N_LOT = 6
 
 

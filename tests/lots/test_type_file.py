@@ -141,27 +141,24 @@ def read(content, folder, **options):
     return read_type(folder / "type.yaml", MODEL)
 
 
+def huge(key):
+    return lambda content: content["parameters"]["b_x"].update({key: 1e200})
+
+
 @pytest.mark.parametrize(("change", "said"), [
-    ({"sensors": 4}, "4 are too few"),
-    ({"parameters": {}}, "give `model`"),
-    ({"schema_version": 2}, "schema_version"),
+    (lambda content: content.update(sensors=4), "4 are too few"),
+    (lambda content: content.update(parameters={}), "give `model`"),
+    (lambda content: content.update(schema_version=2), "schema_version"),
+    (lambda content: content.pop("parameters"), "no file of a type"),
+    (huge("mean"), r"parameters.b_x.mean: must be from \S+ to"),
+    (huge("sigma"), r"parameters.b_x.sigma: must be from \S+ to"),
+    (huge("scatter_below"), r"parameters.b_x.scatter_below: must be from \S+ to"),
 ])  # fmt: skip
-def test_a_file_that_tells_too_little_is_refused(change, said, content, tmp_path):
-    with pytest.raises(InputError, match=said):
-        read({**content, **change}, tmp_path)
-
-
-@pytest.mark.parametrize("key", ["mean", "sigma", "scatter_below"])
-def test_numbers_that_no_type_has_are_refused(key, content, tmp_path):
+def test_a_file_that_tells_too_little_or_too_much_is_refused(change, said, content, tmp_path):
     changed = deepcopy(content)
-    changed["parameters"]["b_x"][key] = 1e200
-    with pytest.raises(InputError, match=rf"parameters.b_x.{key}: must be from \S+ to"):
+    change(changed)
+    with pytest.raises(InputError, match=said):
         read(changed, tmp_path)
-
-
-def test_other_files_are_no_types(tmp_path):
-    with pytest.raises(InputError, match="no file of a type"):
-        read({"models": {"a": ["bias"]}}, tmp_path)
 
 
 def test_the_order_of_keys_says_nothing(content, tmp_path):
