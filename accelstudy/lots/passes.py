@@ -19,8 +19,13 @@ from accelstudy.diagnosis.evidence.candidates import UNKNOWN
 from accelstudy.diagnosis.evidence.noise_tests import AXES, NOISES, TAILS
 from accelstudy.diagnosis.evidence.noise_tests import LEVEL as LEVEL_OF_NOISE
 from accelstudy.diagnosis.rules import RULES
-from accelstudy.lots.evidence import COMMON, Sensor, SensorEvidence, lot_classes
-from accelstudy.lots.mean import mean_sensor
+from accelstudy.lots.evidence import (
+    COMMON,
+    Sensor,
+    SensorEvidence,
+    lot_classes,
+    mean_sensor,
+)
 from accelstudy.lots.mixture import LotTest, Mixture
 from accelstudy.lots.sizes import (
     Equations,

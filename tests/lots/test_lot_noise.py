@@ -10,8 +10,7 @@ import accelstudy as acs
 from accelstudy.approaches import get_approach
 from accelstudy.diagnosis.evidence.size import Level
 from accelstudy.diagnosis.rules import RULES
-from accelstudy.lots.evidence import Sensor, SensorEvidence
-from accelstudy.lots.mean import mean_sensor
+from accelstudy.lots.evidence import Sensor, SensorEvidence, mean_sensor
 from accelstudy.lots.noise import Agreement, NoisePrior, noises_of_lot
 
 N, REDUNDANCY = 16, 40
