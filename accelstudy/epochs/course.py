@@ -46,14 +46,9 @@ class Rate(NamedTuple):
     dof: int
 
     @property
-    def sigmas_95(self) -> float:
-        """Number of sigmas on either side that hold 95 %."""
-        return sigmas_95(self.dof)
-
-    @property
     def interval(self) -> tuple[float, float]:
         """Interval that holds the rate with a probability of 95 %."""
-        half = self.sigmas_95 * self.sigma
+        half = sigmas_95(self.dof) * self.sigma
         return self.per_year - half, self.per_year + half
 
     @property

@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 
 from accelstudy.basics.dates import read_date
 from accelstudy.basics.errors import InputError, key
+from accelstudy.basics.shares import sigmas_95
 from accelstudy.basics.units import GON, MGON, shown_unit, to_display
 from accelstudy.basics.wording import comma_list, estimate, plural
 from accelstudy.campaign.calibration.document import json_content, write_json
@@ -447,7 +448,7 @@ class History(Epochs):
         between = self._at[-1] + (years * YEAR * 1e6).astype("timedelta64[us]")
         line = to_display(design @ course.line.estimates, unit)
         variance = np.einsum("iu,uw,iw->i", design, course.line.covariance, design)
-        half = to_display(course.rate.sigmas_95 * np.sqrt(variance), unit)
+        half = to_display(sigmas_95(course.rate.dof) * np.sqrt(variance), unit)
         seen = ax.get_ylim()
         ax.fill_between(between, line - half, line + half, color=colour, alpha=0.15, linewidth=0)
         ax.plot(between, line, "-" if "drifts" in found else ":", color=colour)
