@@ -183,7 +183,7 @@ def test_bad_input_ends_in_one_line(tmp_path):
         (arguments(paths, ["2023-01-01"] * 3), "--date: all are the same"),
         (arguments(paths, [*YEARS[:2], "1.2.2023"]), "--date: '1.2.2023' is no date"),
         (arguments(paths, [*YEARS[:2], "0202-01-01"]), "--date: 0202-01-01: the year must be"),
-        ([*arguments(paths, YEARS[:3]), "--confidence=rms"], "--confidence: a probability"),
+        ([*arguments(paths, YEARS[:3]), "--confidence=rms"], "--confidence: expected a number"),
         (arguments([*paths[:2], paths[0]], YEARS[:3]), f"{paths[0]}: is given twice"),
         (arguments([*paths[:2], copy], YEARS[:3]), f"{copy}: has the numbers of {paths[0]}"),
         (arguments([*paths, other], YEARS[:4]), "calibration 4 (session-4): effects: quadratic"),
