@@ -8,8 +8,8 @@ from accelstudy.diagnosis.report.output import Diagnosis as Diagnosis
 from accelstudy.epochs.results import Comparison as Comparison
 from accelstudy.epochs.results import History as History
 from accelstudy.lots.output import Lot as Lot
+from accelstudy.planning.design import Design as Design
 from accelstudy.planning.plan import Plan as Plan
-from accelstudy.proposal.design import Design as Design
 from accelstudy.sequential.advice import Advice as Advice
 from accelstudy.study.result import Simulation as Simulation
 from accelstudy.study.run import run_study as run_study

@@ -69,7 +69,7 @@ def new_table(
 
 def new_scheme(*place: Any, **how: Any) -> AbstractContextManager[Path]:
     """Return the place of a scheme."""
-    from accelstudy.proposal.design import new_scheme
+    from accelstudy.planning.design import new_scheme
 
     return new_scheme(*place, **how)
 
@@ -140,7 +140,7 @@ SECTIONS = {
             sections={
                 "What is asked": "tilt_accuracy tilt_range sensor sigma history equipment "
                 "confidence",
-                "What is tried": "holds schemes max_time max_positions replicates seed",
+                "What is tried": "holds max_time max_positions replicates seed",
                 "What the equipment takes": "moving_time robot_moving_time robot_setup_time "
                 "robot_sigma",
             },
@@ -159,9 +159,8 @@ SECTIONS = {
             out="YAML file for the positions.",
             sections={
                 "The calibration": "model approach positions sigma robot_sigma gravity_sigma",
-                "What the positions are to be good for": "criterion tilt_range neglect "
-                "discriminate prior after",
-                "What the positions must keep to": "attitudes roll pitch pole_distance least_angle",
+                "What the positions are to be good for": "criterion tilt_range neglect after",
+                "What the positions must keep to": "attitudes roll pitch pole_distance",
             },
         ),
     ],

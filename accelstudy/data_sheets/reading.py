@@ -18,6 +18,8 @@ from accelstudy.data_sheets.sheet import LEAST_FULL_SCALE, MOST, QUANTITIES, Dat
 from accelstudy.files.reading import read_layer
 
 TEXTS = ("name", "title", "source")
+LOGS = (".csv", ".txt", ".gz", ".mat", ".parquet", ".log", ".dat")
+"""Endings of files that are no data sheets, though one can be made of them."""
 DENSITY = "noise_density"
 """Another way to write the white noise: the one-sided density of most data sheets."""
 
@@ -28,19 +30,27 @@ def data_sheet_names() -> tuple[str, ...]:
 
 
 def get_data_sheet(name_or_path: str | Path) -> DataSheet:
-    """Return a sensor by its name, or from the user's own YAML file.
-
-    A text with a path separator or the ending .yaml or .yml is a path.
+    """Return a sensor by its name, from the user's own YAML file, or from a campaign's folder.
 
     Raises
     ------
     UnknownNameError
         If there is no such sensor.
     InputError
-        If the file cannot be read, or is not a data sheet.
+        If the file cannot be read, or is not a data sheet; for a log the message says how to make
+        one of it.
     """
-    text = str(name_or_path)
-    if text.endswith((".yaml", ".yml")) or os.sep in text or "/" in text:
+    text, path = str(name_or_path), Path(name_or_path)
+    if path.is_dir():
+        from accelstudy.data_sheets.measured import sheet_of_campaign
+
+        return sheet_of_campaign(path)
+    if path.suffix in LOGS:
+        raise InputError(
+            f"{text}: a log, not a data sheet; make one of it: accelstudy data-sheet {text} --out "
+            f"{path.stem}.yaml, with the options by which import reads it"
+        )
+    if path.is_file() or text.endswith((".yaml", ".yml")) or os.sep in text or "/" in text:
         return read_data_sheet(text)
     if text not in _files():
         raise UnknownNameError("sensor", text, data_sheet_names())

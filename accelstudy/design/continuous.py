@@ -1,15 +1,12 @@
-"""A lower bound of a criterion, from designs with shares instead of whole positions.
+"""The least value of a criterion, from designs with shares instead of whole positions.
 
-A convex criterion is also a convex function of the shares w. So its derivatives at any w give a
-lower bound for all shares, and for all sets of whole positions. The general equivalence theorem of
-Kiefer & Wolfowitz (1960) and Whittle (1973) is the case in which the bound is reached:
-
-    φ(w*) ≥ φ(w) + n (min gⱼ − Σ wᵢ gᵢ),  gⱼ = tr(∂φ/∂N · Iⱼ).
+A convex criterion is also a convex function of the shares w, so that its derivatives at any w bound
+it (`criteria`). The better the shares, the closer the bound.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -34,13 +31,13 @@ MAX_GAP = 1e-4
 
 @dataclass(frozen=True)
 class Continuous:
-    """The optimal shares.
+    """The optimal shares, and what they bound.
 
     Attributes
     ----------
     directions : (k, 3) array, attitudes with a share
     shares : (k,) array, of sum 1
-    value : float, criterion of n positions with these shares
+    value : float, of the criterion without neglected effects for n positions with these shares
     bound : float, lower bound of the criterion for any n positions
     """
 
@@ -64,39 +61,28 @@ class _Slope:
 
 
 def continuous_optimum(task: Task, criterion: Criterion, allowed: Attitudes, n: int) -> Continuous:
-    """Find the best shares for n positions among the attitudes that are allowed singly.
-
-    Parameters
-    ----------
-    task : Task
-    criterion : Criterion, convex
-    allowed : Attitudes; a least angle is ignored, so the bound holds with and without it
-    n : int
-    """
-    allowed = replace(allowed, least_angle=None)
+    """Find the best shares for n positions among the attitudes that are allowed."""
+    convex = criterion.convex
     fine, points = allowed.sample(BOUND_ATTITUDES), allowed.sample(SHARED_ATTITUDES)
     fine_flat, flat = _flat(task, fine), _flat(task, points)
     shares, u = np.full(len(points), 1 / len(points)), len(task.names)
-    best = Continuous(points, shares, np.inf, -np.inf)
+    value, bound = np.inf, -np.inf
     for _ in range(ROUNDS):
-        shares = _share(task.prior, criterion, flat, shares, n)
+        shares = _share(task.prior, convex, flat, shares, n)
         keep = shares > 1e-7 / len(shares)
         points, flat, shares = points[keep], flat[keep], shares[keep] / shares[keep].sum()
-        normal = task.prior + n * (shares @ flat).reshape(u, u)
-        value = float(criterion.value(normal))
-        slope = criterion.gradient(normal).ravel()
-        lowest = fine[np.argsort(fine_flat @ slope, kind="stable")[:LOWEST]]
-        lowest = settle(task, _Slope(slope.reshape(u, u)), allowed, lowest)
+        best, normal = (points, shares), task.prior + n * (shares @ flat).reshape(u, u)
+        value, slope = float(convex.value(normal)), convex.gradient(normal)
+        lowest = fine[np.argsort(fine_flat @ slope.ravel(), kind="stable")[:LOWEST]]
+        lowest = settle(task, _Slope(slope), allowed, lowest)
         flat_lowest = _flat(task, lowest)
-        here, there = flat @ slope, flat_lowest @ slope
-        least = min(float(here.min()), float(there.min()))
-        bound = max(best.bound, value + n * (least - float(shares @ here)))
-        best = Continuous(points, shares, value, bound)
+        least = min(float((each @ slope.ravel()).min()) for each in (flat, flat_lowest))
+        bound = max(bound, convex.bound(task.prior, normal, n, least))
         if value - bound < MAX_GAP:
             break
         points, flat = np.concatenate([points, lowest]), np.concatenate([flat, flat_lowest])
         shares = np.concatenate([0.9 * shares, np.full(len(lowest), 0.1 / len(lowest))])
-    return best
+    return Continuous(*best, value, criterion.with_neglected(bound))
 
 
 def _flat(task: Task, directions: Array) -> Array:

@@ -2,7 +2,7 @@
 
 A criterion is the logarithm of a variance, or of a determinant of variances, as a function of the
 scaled normal matrix N. It is to be minimised, and its differences are relative. Its derivative by
-that matrix serves to rank and to move positions.
+that matrix serves to rank and to move positions, and to bound what others can reach.
 
 A calibration estimates some of the parameters, with the cofactors C = N₁₁⁻¹ (and zeros elsewhere).
 Neglected parameters p of variances P shift these estimates by C N p and are missing themselves, so
@@ -11,19 +11,24 @@ mean square is s = tr(W C) + tr(W E P Eᵀ), follow from dC = −C dN C and dE =
 
     ∂s/∂N = −C W C − C W E P Eᵀ − E P Eᵀ W C.
 
-All criteria but the one with neglected effects are convex, so they have a lower bound
-(`continuous`); that one takes its bound from another.
+Where nothing is neglected, the inverse of a mean square, and the root of degree d of a determinant,
+are concave functions of N. So derivatives G = ∂φ/∂N at any N bound the criterion at all sets of n
+positions (general equivalence theorem, Kiefer & Wolfowitz 1960, Whittle 1973):
+
+    φ ≥ φ(N) − d log(1 + (tr G (N − N₀) − n min gⱼ) / d),  gⱼ = tr(G Iⱼ),
+
+with N₀ what is known before the first position.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
-from accelstudy.basics.errors import UnknownNameError
+from accelstudy.basics.errors import InputError, UnknownNameError
 from accelstudy.design.task import Task
 
 Array = NDArray[np.float64]
@@ -31,44 +36,54 @@ Array = NDArray[np.float64]
 RIDGE = 1e-12
 """Added to scaled normal matrices, so that a singular one gives a huge variance, not an error."""
 POWER = 16
-"""Exponent of the power mean that stands for the larger of several mean squares."""
-MINIMAX, ROBUST, DISCRIMINATE = "minimax", "robust", "discriminate"
-CRITERIA = ("I", "D", "A", MINIMAX)
+"""Exponent of the power mean that stands for the larger of two mean squares. It is below the larger
+by ln 2 / 16, 4 %, at most, never above it, and has a derivative also where they are equal."""
+MINIMAX = "minimax"
+TEXTS = {
+    "I": "mean variance of roll and pitch over the tilt range",
+    "D": "determinant of the covariance matrix of the parameters",
+    "A": "mean variance of the scaled parameters",
+    MINIMAX: "variance of roll or of pitch over the tilt range, whichever is larger",
+}
+ROBUST = "mean square of roll and pitch, the neglected effects included"
 
 
 @dataclass(frozen=True)
-class Estimator:
-    """A calibration whose errors count: what it estimates, and what it neglects.
+class Criterion:
+    """The mean square of errors of a calibration, or the power mean of several.
 
     Attributes
     ----------
-    estimated : (k,) array of int, places of its parameters in a normal matrix
-    forms : (a, u, u) array, W of each mean square of errors
+    name : str
+    text : str, what it minimises, for people
+    estimated : (k,) array of int, places of the estimated parameters in a normal matrix
+    forms : (a, u, u) array, W of each mean square
     neglected : (q,) array of int, places of the neglected parameters
     variance : (q,) array, diagonal of P
+    power : int, of the power mean
     """
 
+    name: str
+    text: str
     estimated: NDArray[np.int_]
     forms: Array
-    neglected: NDArray[np.int_] = field(default_factory=lambda: np.zeros(0, dtype=int))
-    variance: Array = field(default_factory=lambda: np.zeros(0))
+    neglected: NDArray[np.int_]
+    variance: Array
+    power: int = 1
+
+    @property
+    def degree(self) -> int:
+        """Degree of e^criterion as a function of the variances."""
+        return 1
 
     @cached_property
     def _ridge(self) -> Array:
         return RIDGE * np.eye(len(self.estimated))
 
-    @cached_property
-    def _flat(self) -> Array:
-        return self.forms.reshape(len(self.forms), -1)
-
-    @cached_property
-    def _block(self) -> tuple[NDArray[np.int_], NDArray[np.int_]]:
-        return self.estimated[:, None], self.estimated
-
     def part(self, normal: Array) -> Array:
         """Normal matrix of the estimated parameters, (..., k, k)."""
         if len(self.estimated) < normal.shape[-1]:
-            normal = normal[..., *self._block]
+            normal = normal[..., self.estimated[:, None], self.estimated]
         return normal + self._ridge
 
     def cofactors(self, normal: Array) -> Array:
@@ -77,109 +92,81 @@ class Estimator:
         if inverse.shape == normal.shape:
             return inverse
         whole = np.zeros(normal.shape)
-        whole[..., *self._block] = inverse
+        whole[..., self.estimated[:, None], self.estimated] = inverse
         return whole
 
-    def covariances(self, normal: Array) -> tuple[Array, Array | None]:
-        """C and E P Eᵀ, (..., u, u); None if nothing is neglected."""
+    def _errors(self, normal: Array) -> tuple[Array, Array | float]:
+        """C and E P Eᵀ, (..., u, u); 0 if nothing is neglected."""
         cofactors = self.cofactors(normal)
         if not len(self.neglected):
-            return cofactors, None
+            return cofactors, 0.0
         errors = (cofactors @ normal - np.eye(normal.shape[-1]))[..., self.neglected]
         return cofactors, (errors * self.variance) @ errors.swapaxes(-1, -2)
 
-    def squares(self, cofactors: Array, shifts: Array | None) -> Array:
-        """Mean squares, (a, ...)."""
-        covariance = cofactors if shifts is None else cofactors + shifts
-        return np.asarray(self._flat @ covariance.reshape(*cofactors.shape[:-2], -1).T)
+    def squares(self, normal: Array) -> Array:
+        """Mean squares, (a, ...), of normal matrices (..., u, u)."""
+        return self._squares(*self._errors(normal))
 
-    def gradient(self, cofactors: Array, shifts: Array | None, weights: Array) -> Array:
-        """Derivative of Σ weightₐ squareₐ by normal matrices (..., u, u), symmetric."""
+    def _squares(self, cofactors: Array, shifts: Array | float) -> Array:
+        flat = (cofactors + shifts).reshape(*cofactors.shape[:-2], -1)
+        return np.asarray(self.forms.reshape(len(self.forms), -1) @ flat.T)
+
+    def value(self, normal: Array) -> Array:
+        """Values, (...), of normal matrices (..., u, u)."""
+        logs = np.log(self.squares(normal))
+        if len(logs) == 1:
+            return np.asarray(logs[0])
+        mean = np.logaddexp.reduce(self.power * logs) - np.log(len(logs))
+        return np.asarray(mean / self.power)
+
+    def gradient(self, normal: Array) -> Array:
+        """Derivative by symmetric normal matrices (..., u, u), symmetric."""
+        cofactors, shifts = self._errors(normal)
+        squares = self._squares(cofactors, shifts)
+        relative = squares / squares.max(axis=0)
+        weights = relative**self.power / np.sum(relative**self.power, axis=0) / squares
         left = cofactors @ np.tensordot(weights, self.forms, (0, 0))
         slope = -left @ cofactors
-        if shifts is not None:
+        if len(self.neglected):
             by_shifts = left @ shifts
             slope -= by_shifts + by_shifts.swapaxes(-1, -2)
         return np.asarray(slope)
 
-
-@dataclass(frozen=True)
-class Criterion:
-    """The mean square of errors, or the power mean of several.
-
-    A high power stands for the larger one. It has a derivative also where two mean squares are
-    equal; where one is larger, it is below that one by ln 2 / 16, 4 %, at most. A power mean of
-    log-convex functions is log-convex, and never above the larger one, so its lower bound holds for
-    that one, too.
-
-    Attributes
-    ----------
-    name : str
-    text : str, what it minimises, for people
-    estimators : tuple of Estimator, whose parameters the positions must determine
-    power : int, of the power mean
-    """
-
-    name: str
-    text: str
-    estimators: tuple[Estimator, ...]
-    power: int = 1
-
-    @property
-    def degree(self) -> int:
-        """Degree of e^criterion as a function of the variances."""
-        return 1
-
-    def squares(self, normal: Array) -> Array:
-        """All mean squares, (a, ...)."""
-        each = [one.squares(*one.covariances(normal)) for one in self.estimators]
-        return each[0] if len(each) == 1 else np.concatenate(each)
-
-    def value(self, normal: Array) -> Array:
-        """Values, (...), of normal matrices (..., u, u)."""
-        squares = self.squares(normal)
-        if len(squares) == 1:
-            return np.asarray(np.log(squares[0]))
-        logs = self.power * np.log(squares)
-        return np.asarray((np.logaddexp.reduce(logs) - np.log(len(logs))) / self.power)
-
-    def gradient(self, normal: Array) -> Array:
-        """Derivative by symmetric normal matrices (..., u, u), symmetric."""
-        errors = [one.covariances(normal) for one in self.estimators]
-        squares = [one.squares(*at) for one, at in zip(self.estimators, errors, strict=True)]
-        whole = np.concatenate(squares)
-        largest = whole.max(axis=0)
-        relative = whole / largest
-        weights = relative ** (self.power - 1) / np.sum(relative**self.power, axis=0) / largest
-        slope, first = np.zeros_like(normal), 0
-        for one, at in zip(self.estimators, errors, strict=True):
-            slope += one.gradient(*at, weights[first : first + len(one.forms)])
-            first += len(one.forms)
-        return slope
-
     def efficiency(self, value: float, best: float) -> float:
         """Share of the positions that would suffice if the bound were reached."""
-        return float(np.exp((best - value) / self.degree))
+        return min(1.0, float(np.exp((best - value) / self.degree)))
+
+    def bound(self, before: Array, normal: Array, n: int, least: float) -> float:
+        """Lower bound for all sets of n positions, by the derivatives at one normal matrix.
+
+        Parameters
+        ----------
+        before, normal : (u, u) arrays, N₀ and N
+        n : int
+        least : float, smallest gⱼ of the attitudes that are allowed
+        """
+        sum_of = float(np.sum(self.gradient(normal) * (normal - before)))
+        further = max(sum_of - n * least, 0.0) / self.degree
+        return float(self.value(normal)) - self.degree * float(np.log1p(further))
 
     @property
     def convex(self) -> Criterion:
-        """A convex criterion that is never above this one: that of the estimated parameters."""
-        alone = (Estimator(each.estimated, each.forms) for each in self.estimators)
-        return replace(self, estimators=tuple(alone))
+        """The criterion without neglected effects: never above this one, and bounded."""
+        return replace(self, neglected=np.zeros(0, dtype=int), variance=np.zeros(0))
 
-    def bound(self, convex: float) -> float:
+    def with_neglected(self, bound: float) -> float:
         """Lower bound of this criterion, given that of `convex`.
 
         What no shift of the estimates can compensate is added: W₂₂ − W₂₁ W₁₁⁻¹ W₁₂.
         """
-        one = self.estimators[0]
-        if not len(one.neglected):
-            return convex
-        form, (rows, columns) = one.forms[0], one._block
-        inverse = np.linalg.pinv(form[rows, columns], rcond=1e-9, hermitian=True)
-        across = form[rows, one.neglected]
-        remains = np.diag(form)[one.neglected] - np.sum(across * (inverse @ across), axis=0)
-        return float(np.log(np.exp(convex) + np.sum(np.maximum(remains, 0.0) * one.variance)))
+        if not len(self.neglected) or len(self.forms) > 1:
+            return bound
+        form, estimated = self.forms[0], self.estimated
+        block = form[estimated[:, None], estimated]
+        across = form[estimated[:, None], self.neglected]
+        taken = across * (np.linalg.pinv(block, rcond=1e-9, hermitian=True) @ across)
+        remains = np.diag(form)[self.neglected] - np.sum(taken, axis=0)
+        return float(np.log(np.exp(bound) + np.sum(np.maximum(remains, 0.0) * self.variance)))
 
 
 class Determinant(Criterion):
@@ -188,45 +175,46 @@ class Determinant(Criterion):
     @property
     def degree(self) -> int:
         """The determinant has one of each parameter."""
-        return len(self.estimators[0].estimated)
+        return len(self.estimated)
 
     def value(self, normal: Array) -> Array:
         """Log-determinant of the covariance matrix."""
-        return np.asarray(-np.linalg.slogdet(self.estimators[0].part(normal))[1])
+        return np.asarray(-np.linalg.slogdet(self.part(normal))[1])
 
     def gradient(self, normal: Array) -> Array:
         """− N⁻¹."""
-        return -self.estimators[0].cofactors(normal)
+        return -self.cofactors(normal)
 
 
 def get_criterion(name: str, task: Task) -> Criterion:
-    """Return a criterion by its name, of `CRITERIA` or for effects that the task neglects.
+    """Return a criterion by its name; those of the tilt take neglected effects into account."""
+    if name not in TEXTS:
+        raise UnknownNameError("criterion", name, TEXTS)
+    angles, tilt = task.tilt_weights, name in ("I", MINIMAX)
+    if task.neglected and not tilt:
+        raise InputError(
+            f"criterion {name}: effects that are neglected have a criterion of their own; leave it "
+            "out"
+        )
+    forms = angles if name == MINIMAX else angles.mean(axis=0)[None]
+    return (Determinant if name == "D" else Criterion)(
+        {"I": "robust", MINIMAX: "robust minimax"}[name] if task.neglected else name,
+        ROBUST if task.neglected and name == "I" else TEXTS[name],
+        np.flatnonzero(task.estimated),
+        forms if tilt else np.diag(task.estimated * 1.0)[None],
+        np.flatnonzero(~task.estimated),
+        task.neglected_sigmas**2,
+        POWER if name == MINIMAX else 1,
+    )
 
-    Robust takes these into account. Discriminate is for two of them, which are to be told apart: it
-    is the mean square of their MIBs, the sizes from which they are seen. Only the part of a
-    signature counts that neither the model nor the rival can imitate, so each parameter is one of a
-    calibration with both, without the other parameters of its effect.
+
+def rms_tilt(task: Task, directions: ArrayLike) -> Array:
+    """Expected rms of roll and of pitch, rad, (2,), without the noise of the leveled reading.
+
+    Neglected effects contribute as a scatter of their given size. Infinite where the positions do
+    not determine the model.
     """
-    places, left = np.flatnonzero(task.estimated), np.flatnonzero(~task.estimated)
-    unit, angles = np.eye(len(task.names)), task.tilt_weights
-    mean, own = angles.mean(axis=0)[None], np.diag(task.estimated * 1.0)[None]
-    if name == DISCRIMINATE:
-        first, second = (task.places(effect) for effect in task.neglected)
-        text = "mean square of the sizes at which the two effects can be told from each other"
-        pairs = [(rival, one) for mine, rival in ((first, second), (second, first)) for one in mine]
-        parts = (Estimator(np.array([*places, *r, i]), np.diag(unit[i])[None]) for r, i in pairs)
-        return Criterion(name, text, tuple(parts))
-    if name == ROBUST:
-        text = "mean square of roll and pitch, the neglected effects included"
-        return Criterion(name, text, (Estimator(places, mean, left, task.neglected_sigmas**2),))
-    known: dict[str, tuple[str, Array]] = {
-        "I": ("mean variance of roll and pitch over the tilt range", mean),
-        "D": ("determinant of the covariance matrix of the parameters", own),
-        "A": ("mean variance of the scaled parameters", own),
-        MINIMAX: ("variance of roll or of pitch over the tilt range, whichever is larger", angles),
-    }
-    if name not in known:
-        raise UnknownNameError("criterion", name, (*CRITERIA, ROBUST))
-    text, forms = known[name]
-    kind = Determinant if name == "D" else Criterion
-    return kind(name, text, (Estimator(places, forms),), POWER if name == MINIMAX else 1)
+    estimated = np.flatnonzero(task.estimated)
+    if task.information(directions).undetermined(estimated).any():
+        return np.full(2, np.inf)
+    return np.sqrt(get_criterion(MINIMAX, task).squares(task.normal(directions)))

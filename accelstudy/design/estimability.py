@@ -101,14 +101,10 @@ def estimability(
         count, as unit vectors would have the sensor's errors in their directions.
     blur : float, m/s², noise of readings by which they are judged
     """
-    noise = noise or Noise()
-    ideal = np.zeros(model.n_parameters)
+    noise, ideal = noise or Noise(), np.zeros(model.n_parameters)
     names = (*model.parameter_names, "g") if noise.sigma_gravity > 0 else model.parameter_names
     directions = scheme.directions if forces is None else -forces / gravity
-    design = partial(
-        _design, model=model, approach=approach, noise=noise, gravity=gravity, hold=hold,
-        known=known or {},
-    )  # fmt: skip
+    design = partial(_design, (model, approach, noise, gravity, hold, known or {}))
     a = design(directions, ideal)
     rank, condition, free = exact = rank_of(a)
     if blur and not free.any():
@@ -132,28 +128,16 @@ def estimability(
             a = design(scheme.directions, np.asarray(parameters, dtype=float))
         scale = np.linalg.norm(a, axis=0)
         cofactors = np.linalg.inv((a / scale).T @ (a / scale)) / np.outer(scale, scale)
-    return Estimability(
-        parameter_names=names,
-        rank=rank,
-        condition=condition,
-        redundancy=len(a) - len(names),
-        not_estimable=not_estimable,
-        reason=reason,
-        cofactors=cofactors,
-    )
+    redundancy = len(a) - len(names)
+    return Estimability(names, rank, condition, redundancy, not_estimable, reason, cofactors)
 
 
-def _design(
-    directions: Array,
-    parameters: Array,
-    model: SensorModel,
-    approach: Approach,
-    noise: Noise,
-    gravity: float,
-    hold: HoldConditions | None,
-    known: Known,
-) -> Array:
+SetUp = tuple[SensorModel, Approach, Noise, float, HoldConditions | None, Known]
+
+
+def _design(set_up: SetUp, directions: Array, parameters: Array) -> Array:
     """Design matrix (conditions, u) with unit weights."""
+    model, approach, noise, gravity, hold, known = set_up
     ideal = session(model, parameters, directions, gravity, hold)
     observed = replace(ideal.observations(noise), known=known)
     return whitened_jacobian(model, approach, observed, parameters)
@@ -161,8 +145,7 @@ def _design(
 
 def is_blind(model: SensorModel, approach: Approach, noise: Noise, gravity: float) -> bool:
     """Whether an approach cannot determine a model in any scheme, whatever the conditions are."""
-    ideal = np.zeros(model.n_parameters)
     hold = EVERYTHING_VARIES.hold(SUFFICIENT_POSITIONS)
-    many = evenly_spread(SUFFICIENT_POSITIONS)
-    a = _design(many, ideal, model, approach, noise, gravity, hold, {})
+    set_up: SetUp = (model, approach, noise, gravity, hold, {})
+    a = _design(set_up, evenly_spread(SUFFICIENT_POSITIONS), np.zeros(model.n_parameters))
     return rank_of(a)[0] < a.shape[1]

@@ -10,8 +10,7 @@ saddles (Dauphin et al. 2014), and none as smaller than a share of the largest. 
 is all that pulls along equally good sets, does not grow: on each processor the search ends in the
 same place, to some 10 digits.
 
-Limits of roll and pitch hold a position that would leave them. A least angle is kept by a barrier,
-−τ Σ log(cos least angle − cos angle) over all pairs (Boyd & Vandenberghe 2004, chapter 11).
+Limits of roll and pitch hold a position that would leave them.
 """
 
 from __future__ import annotations
@@ -41,8 +40,6 @@ TRIED = 4.0 ** np.arange(1.0, -5.0, -1.0)
 MIN_GAIN = 1e-6
 """Gain of the criterion, a logarithm, below which a step is the last."""
 MOST_STEPS = 60
-BARRIER = 1e-6
-"""τ; a pair at the least angle loses about as much of the criterion."""
 
 
 class Objective(Protocol):
@@ -63,21 +60,12 @@ def settle(task: Task, objective: Objective, allowed: Attitudes, start: Array) -
     if allowed.points is not None:
         return start
     low, high = allowed.limits
-    n, u, pairs = len(start), len(task.names), np.triu_indices(len(start), 1)
-    closest = None if allowed.least_angle is None else np.cos(allowed.least_angle)
-
-    def room(directions: Array) -> Array:
-        cosines = directions @ directions.swapaxes(-1, -2)
-        return np.asarray((closest or 0.0) - cosines[..., *pairs])
+    n, u = len(start), len(task.names)
 
     def values(angles: Array) -> Array:
         directions = directions_at(angles)
         each = task.informations(directions.reshape(-1, 3)).reshape(*directions.shape[:2], -1)
-        value = objective.value(task.prior + each.sum(axis=1).reshape(-1, u, u))
-        if closest is not None:
-            with np.errstate(divide="ignore"):
-                value = value - BARRIER * np.log(np.maximum(room(directions), 0.0)).sum(axis=1)
-        return value
+        return objective.value(task.prior + each.sum(axis=1).reshape(-1, u, u))
 
     angles = np.clip(angles_to(start), low, high)
     value = float(values(angles[None])[0])
@@ -87,15 +75,6 @@ def settle(task: Task, objective: Objective, allowed: Attitudes, start: Array) -
         around = directions_at(angles + WIDTH * across * AROUND[:, None])
         slope, curvature = _derivatives(task, objective, around)
         floor = MIN_CURVATURE * np.linalg.norm(curvature, 2)
-        if closest is not None:
-            middle = around[4]
-            moved = _first(around.reshape(3, 3, n, 3)) @ middle.T / WIDTH
-            force = np.zeros((len(pairs[0]), n, 2))
-            for i, j in (pairs, pairs[::-1]):
-                force[np.arange(len(i)), i] = moved[i, :, j]
-            force = force.reshape(-1, 2 * n) / room(middle)[:, None]
-            slope = slope + BARRIER * force.sum(axis=0)
-            curvature = curvature + BARRIER * force.T @ force
         held = (angles <= low) & (slope.reshape(n, 2) > 0)
         held |= (angles >= high) & (slope.reshape(n, 2) < 0)
         free = np.flatnonzero(~held)
@@ -117,7 +96,8 @@ def _derivatives(task: Task, objective: Objective, around: Array) -> tuple[Array
     """Derivatives, (2n,) and (2n, 2n), from directions `AROUND` positions, (9, n, 3)."""
     n, u = around.shape[1], len(task.names)
     each = task.informations(around.reshape(-1, 3)).reshape(3, 3, n, u * u)
-    changes = _first(each).reshape(2 * n, u, u)
+    changes = np.stack([each[2, 1] - each[0, 1], each[1, 2] - each[1, 0]], axis=1) / 2
+    changes = changes.reshape(2 * n, u, u)
     normal = task.prior + each[1, 1].sum(axis=0).reshape(u, u)
     gradient = objective.gradient(normal)
     ahead, behind = (objective.gradient(normal + sign * changes) for sign in (1, -1))
@@ -131,8 +111,3 @@ def _derivatives(task: Task, objective: Objective, around: Array) -> tuple[Array
         np.array([[by_roll, mixed], [mixed, by_pitch]]), -1, 0
     )
     return flat @ gradient.ravel() / WIDTH, (curvature + curvature.T) / 2 / WIDTH**2
-
-
-def _first(each: Array) -> Array:
-    """First differences of what is known `AROUND` n positions, (3, 3, n, ...): (n, 2, ...)."""
-    return np.stack([each[2, 1] - each[0, 1], each[1, 2] - each[1, 0]], axis=1) / 2

@@ -1,4 +1,4 @@
-"""The search for the best positions.
+"""The search for the best positions, and a bound of what any positions can reach.
 
 Positions are exchanged for better ones of a list of candidates (Fedorov 1972), from several random
 sets. Then they move until no small move makes the criterion better (`newton`), and positions that
@@ -26,8 +26,6 @@ Array = NDArray[np.float64]
 
 CANDIDATES = 600
 STARTS = 8
-DRAWS = 200
-"""Number of random sets that are drawn to find one that keeps its distances."""
 MAX_TRIED = 24
 """Number of places that are tried for a position, in the order in which the derivative of the
 criterion ranks them: the KL exchange of Atkinson & Donev (1989)."""
@@ -66,9 +64,9 @@ class Optimum:
     efficiency: float = np.nan
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Search:
-    """The search for the n positions that are best by a criterion.
+    """The search for positions that are best by a criterion.
 
     The same search finds the same positions on every processor, but for their last digit.
 
@@ -76,23 +74,23 @@ class Search:
     ----------
     task : Task
     criterion : Criterion
-    n : int
     allowed : Attitudes
     seed : int
     """
 
     task: Task
     criterion: Criterion
-    n: int
     allowed: Attitudes = field(default_factory=Attitudes)
     seed: int = 1
+    _settled: dict[tuple[int, int], Array] = field(default_factory=dict)
 
-    def optimum(self, starts: int = STARTS, bounded: bool = True) -> Optimum:
-        """Find the positions.
+    def optimum(self, n: int, starts: int = STARTS, bounded: bool = True) -> Optimum:
+        """Find the best n positions.
 
         Parameters
         ----------
-        starts : int, random sets to begin with
+        n : int
+        starts : int, random sets to begin with; those of an earlier search are not searched again
         bounded : bool, whether the bound, and with it the efficiency, is wanted
 
         Raises
@@ -100,27 +98,35 @@ class Search:
         InputError
             If no attitude is allowed, the allowed ones do not determine the model, or are too few.
         """
-        self._check()
-        each = [self._settle(self.exchange(start)) for start in range(1, starts + 1)]
+        self._check(n)
+        each = [self._from_start(n, start) for start in range(1, starts + 1)]
         best = each[first_best([self.value(one) for one in each], DESIGN_TOLERANCE)]
         directions = round_directions(self._join(best))
         found = Optimum(directions, self.value(directions))
-        if reason := self._missing(directions):
+        if reason := self.task.missing(directions):
+            if of_all := self.task.missing(self.candidates):
+                raise InputError(f"the allowed attitudes do not suffice: {of_all}")
             raise InputError(
-                f"no {self.n} positions of {self.allowed.text} were found that suffice: {reason}"
+                f"no {n} positions of {self.allowed.text} were found that suffice: {reason}"
             )
         if not bounded:
             return found
-        shares = continuous_optimum(self.task, self.criterion.convex, self.allowed, self.n)
-        bound = self.criterion.bound(shares.bound)
-        efficiency = min(1.0, self.criterion.efficiency(found.value, bound))
+        bound = continuous_optimum(self.task, self.criterion, self.allowed, n).bound
+        efficiency = self.criterion.efficiency(found.value, bound)
         return replace(found, bound=bound, efficiency=efficiency)
 
-    def exchange(self, start: int) -> Array:
+    def _from_start(self, n: int, start: int) -> Array:
+        """Positions that a search from one random set ends in, (n, 3)."""
+        if (n, start) not in self._settled:
+            self._settled[n, start] = self._settle(self.exchange(n, start))
+        return self._settled[n, start]
+
+    def exchange(self, n: int, start: int) -> Array:
         """Candidates of which none can be exchanged for a better one, from a random set; (n, 3)."""
         before = self.task.prior + PRIOR_INFORMATION * np.eye(len(self.task.prior))
-        informations = self._informations
-        flat, chosen = informations.reshape(len(informations), -1), self._random(start)
+        informations, k = self._informations, len(self.candidates)
+        rng, flat = np.random.default_rng([self.seed, start]), informations.reshape(k, -1)
+        chosen = [int(rng.choice(k)) for _ in range(n)]
         for _ in range(MAX_SWEEPS):
             # Computed anew, without the rounding of many exchanges.
             normal = before + informations[chosen].sum(axis=0)
@@ -130,12 +136,7 @@ class Search:
                 if order is None:  # the rank of the candidates, until a position is exchanged
                     rank = flat @ self.criterion.gradient(normal).ravel()
                     order = stable_order(rank, CRITERION_TOLERANCE * float(np.abs(rank).max()))
-                others = self.candidates[chosen[:i] + chosen[i + 1 :]]
-                apart = self.allowed.are_apart(self.candidates, others)
-                tried = order[apart[order]][:MAX_TRIED]
-                if not len(tried):
-                    continue
-                rest = normal - informations[old]
+                tried, rest = order[:MAX_TRIED], normal - informations[old]
                 values = self.criterion.value(rest + informations[tried])
                 best = first_best(values)
                 if values[best] < value - LEAST_GAIN:
@@ -153,10 +154,8 @@ class Search:
         """Positions that lie close together replaced by one of them, repeated.
 
         Where repeats are best, a search ends with such positions: near the optimum nothing draws
-        them together completely. Where a least angle is asked for, there are none.
+        them together completely.
         """
-        if self.allowed.least_angle is not None:
-            return directions
         first = np.argmax(directions @ directions.T > np.cos(MAX_JOINED_ANGLE), axis=1)
         while not np.array_equal(first, first[first]):  # near each other by way of others
             first = first[first]
@@ -179,52 +178,24 @@ class Search:
         """The criterion of positions."""
         return float(self.criterion.value(self.task.normal(directions)))
 
-    def _check(self) -> None:
-        """Raise `InputError` if no n positions can determine what is wanted."""
+    def least_value(self, directions: Array) -> float:
+        """Lower bound of the criterion of as many positions, by the derivatives at these."""
+        normal, criterion = self.task.normal(directions), self.criterion.convex
+        gains = np.tensordot(self._informations, criterion.gradient(normal), 2)
+        return criterion.bound(self.task.prior, normal, len(directions), float(gains.min()))
+
+    def _check(self, n: int) -> None:
+        """Raise `InputError` if no attitude is allowed, or n positions have too few conditions."""
         if not len(self.candidates):
             limits = ", ".join(self.allowed.constraints) or "no constraints"
             raise InputError(f"no attitude is left of {self.allowed.text} with {limits}")
-        if not self._determined(self.candidates):
-            reason = self._missing(self.candidates)
-            raise InputError(f"the allowed attitudes do not suffice: {reason}")
-        unknown = max(len(each.estimated) for each in self.criterion.estimators)
+        unknown = int(np.count_nonzero(self.task.estimated))
         rank_before = int(np.linalg.matrix_rank(self.task.prior))
         least = -(-(unknown - rank_before) // self.task.approach.n_conditions)
-        if self.n < least:
+        if n < least:
             raise InputError(
-                f"{self.n} positions do not determine {unknown} parameters; at least {least} are "
-                "needed"
+                f"{n} positions do not determine {unknown} parameters; at least {least} are needed"
             )
-
-    def _determined(self, directions: Array) -> bool:
-        """Whether positions determine what is wanted, but for noise."""
-        information = self.task.information(directions)
-        each = self.criterion.estimators
-        return not any(information.undetermined(one.estimated).any() for one in each)
-
-    def _missing(self, directions: Array) -> str:
-        """Why positions do not determine what is wanted; empty if they do."""
-        if reason := self.task.missing(directions):
-            return reason
-        return "" if self._determined(directions) else "they do not tell the two effects apart"
-
-    def _random(self, start: int) -> list[int]:
-        """Draw n candidates that may stand together; `InputError` if so many do not fit."""
-        rng = np.random.default_rng(np.random.SeedSequence([self.seed, start]))
-        most = 0
-        for _ in range(DRAWS):
-            chosen: list[int] = []
-            free = np.ones(len(self.candidates), dtype=bool)
-            while len(chosen) < self.n and free.any():
-                chosen.append(int(rng.choice(np.flatnonzero(free))))
-                free &= self.allowed.are_apart(self.candidates, self.candidates[chosen[-1:]])
-            if len(chosen) == self.n:
-                return chosen
-            most = max(most, len(chosen))
-        raise InputError(
-            f"{self.n} positions {self.allowed.constraints[-1]} were not found among the allowed "
-            f"attitudes; {most} were"
-        )
 
 
 def round_directions(directions: Array) -> Array:

@@ -5,18 +5,15 @@ from __future__ import annotations
 from collections.abc import Callable, Collection
 from dataclasses import dataclass
 from functools import cached_property, partial
-from io import StringIO
-from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
 
 from accelstudy.basics.errors import InputError, UnknownNameError
-from accelstudy.basics.units import ANGLE_UNITS, GON, attitude_unit, to_attitude, to_si
-from accelstudy.basics.wording import short_list
-from accelstudy.files.reading import read_text
+from accelstudy.basics.units import GON, attitude_unit, to_attitude
 from accelstudy.leveling.angles import angles_of, specific_force
 from accelstudy.positions.points import corners, edges, evenly_spread, faces
+from accelstudy.schemes import UnknownSchemeError, get_scheme
 
 Array = NDArray[np.float64]
 
@@ -34,7 +31,6 @@ class Attitudes:
     points : (k, 3) array of unit vectors; None for all attitudes
     roll, pitch : (least, most); None where there is no limit
     pole_distance : float, least angle between the x axis and the vertical, where roll is undefined
-    least_angle : float, between any two positions
     """
 
     text: str = "all attitudes"
@@ -42,7 +38,6 @@ class Attitudes:
     roll: tuple[float, float] | None = None
     pitch: tuple[float, float] | None = None
     pole_distance: float | None = None
-    least_angle: float | None = None
 
     def __post_init__(self) -> None:
         for name in ("roll", "pitch"):
@@ -60,8 +55,6 @@ class Attitudes:
         ]
         if self.pole_distance is not None:
             texts.append(f"at least {_angle_text(self.pole_distance)} from the roll pole")
-        if self.least_angle is not None:
-            texts.append(f"at least {_angle_text(self.least_angle)} between positions")
         return texts
 
     @cached_property
@@ -89,13 +82,6 @@ class Attitudes:
         inside = (angles >= low - TOLERANCE) & (angles <= high + TOLERANCE)
         return directions[inside.all(axis=1)]
 
-    def are_apart(self, directions: Array, others: Array) -> NDArray[np.bool_]:
-        """Which of k directions are far enough from all of the others, (k,)."""
-        if self.least_angle is None or not len(others):
-            return np.ones(len(directions), dtype=bool)
-        limit = np.cos(self.least_angle - TOLERANCE)
-        return np.asarray(np.all(directions @ others.T <= limit, axis=1))
-
 
 def cube() -> Attitudes:
     """Attitudes of a cube on a table: on its faces, edges and corners."""
@@ -122,60 +108,26 @@ NAMED: dict[str, Callable[[], Attitudes]] = {
     "grid": partial(attitudes_by_eye, 25 * GON),
 }
 """Sets of attitudes; steps of 30° are judged by eye, those of 25 gon are for a robot."""
+SPACES = ("all", "cube", "hand")
+"""Those that a design chooses from."""
 
 
 def find_attitudes(name: str, names: Collection[str]) -> Attitudes:
-    """Attitudes by their name, one of some of `NAMED`, or the path of a CSV file.
+    """Attitudes by their name, one of some of `NAMED`, or those of a scheme.
 
     Raises
     ------
     InputError
-        If there is no such set, or the file cannot be read.
+        If there is no such set, or the file of the scheme cannot be read.
     """
     if name in names:
         return NAMED[name]()
-    if name.endswith(".csv") or "/" in name:
-        return read_attitudes(Path(name))
-    raise UnknownNameError("set of attitudes", name, (*names, "FILE.csv"))
-
-
-def read_attitudes(path: Path) -> Attitudes:
-    """Read the attitudes of a CSV file.
-
-    It has the columns x, y, z (directions of gravity in the body frame) or roll_U, pitch_U, where U
-    is one of gon, deg and rad.
-
-    Raises
-    ------
-    InputError
-        If it cannot be read, or has neither.
-    """
-    import pandas as pd  # slow to import, and seldom needed
-
     try:
-        table = pd.read_csv(StringIO(read_text(path)), comment="#", dtype=str)
-    except InputError:
-        raise
-    except ValueError:
-        raise InputError(f"{path}: is no CSV table") from None
-    units = (*ANGLE_UNITS, "rad")
-    pairs = [("x", "y", "z"), *((f"roll_{u}", f"pitch_{u}") for u in units)]
-    columns = next((names for names in pairs if set(names) <= set(table.columns)), None)
-    if columns is None:
-        wanted = "; ".join(", ".join(names) for names in pairs)
-        raise InputError(
-            f"{path}: has the columns {short_list([*map(str, table.columns)])}; expected {wanted}"
-        )
-    values = table[list(columns)].apply(pd.to_numeric, errors="coerce").to_numpy(dtype=float)
-    bad = np.flatnonzero(~np.isfinite(values).all(axis=1))
-    if len(bad):
-        raise InputError(f"{path}: row {bad[0] + 1}: {', '.join(columns)} must be numbers")
-    if len(columns) == 2:
-        values = directions_at(to_si(values, columns[0].rpartition("_")[2], "rad"))
-    if not len(values) or not np.all(np.linalg.norm(values, axis=1) > 0):
-        raise InputError(f"{path}: no attitudes in it, or a direction of length zero")
-    points = np.unique(_unit(values).round(12), axis=0)
-    return Attitudes(f"{len(points)} attitudes of {path.name}", _unit(points))
+        scheme = get_scheme(name)
+    except UnknownSchemeError:
+        raise UnknownNameError("set of attitudes", name, (*names, "a scheme")) from None
+    points = np.unique(scheme.directions.round(12), axis=0)
+    return Attitudes(f"{len(points)} attitudes of {scheme.name}", _unit(points))
 
 
 def angles_to(directions: Array) -> Array:

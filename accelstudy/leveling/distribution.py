@@ -133,36 +133,18 @@ class TiltDistribution:
         spread = np.einsum("auw,uw->a", self.tilt.quadratic, self.covariance)
         return self.tilt.constant + spread
 
-    @cached_property
-    def chi_squared(self) -> tuple[Array, Array]:
-        """Factor and degrees of freedom, (2,), of the scaled χ² with equal mean and variance."""
+    def quantile(self, probabilities: ArrayLike) -> Array:
+        """Quantiles of roll, of pitch and of the larger, (3, k), rad.
+
+        They are solved for from those of the scaled χ² of equal mean and variance.
+        """
+        wanted = scipy.special.ndtri(np.asarray(probabilities, dtype=float))
         forms, linear = self._forms
         variance = 2 * np.einsum("aij,aij->a", forms, forms) + 4 * (linear**2).sum(axis=1)
-        return scaled_chi_squared(self.mean_squares, variance)
-
-    def quantile(self, probabilities: ArrayLike) -> Array:
-        """Quantiles of roll, of pitch and of the larger, (3, k), rad."""
-        wanted = scipy.special.ndtri(np.asarray(probabilities, dtype=float))
-        start = np.log(self.approximate_quantile(scipy.special.ndtr(wanted)))
-        if not self._central:
-            return np.exp(_solved(self._scores_with_offset, start, wanted)[0])
-
-        def scores(angle: int) -> Callable[[Array], Array]:
-            return lambda at: np.asarray(scipy.special.ndtri(self._exact(angle, np.exp(at))))
-
-        each = [_solved(scores(a), start[a], wanted)[0] for a in (0, 1)]
-        largest = np.sqrt(np.sort(self._along[2].max(axis=0)))
-
-        def uncorrected(at: Array) -> Array:
-            shares = [self._length(bound / largest).mean() for bound in np.exp(at)]
-            return np.asarray(scipy.special.ndtri(shares))
-
-        both, slope = _solved(uncorrected, np.maximum(*each), wanted)
-        for _ in range(2):
-            exact = scipy.special.ndtri(self._share_of_both(np.exp(both)))
-            step = np.where(np.isfinite(slope) & np.isfinite(exact), (wanted - exact) / slope, 0.0)
-            both = both + step
-        return np.exp([*each, both])
+        factor, freedom = scaled_chi_squared(self.mean_squares[:, None], variance[:, None])
+        start = np.sqrt(scipy.special.chdtri(freedom, scipy.special.ndtr(-wanted)) * factor)
+        start = np.log(np.vstack([start, start.max(axis=0)]))
+        return np.exp(_solved(self._scores, start, wanted))
 
     def relative_error(self, probabilities: ArrayLike) -> Array:
         """Relative errors of quantiles as of `quantile` by the directions, (3, k)."""
@@ -171,29 +153,30 @@ class TiltDistribution:
         single = np.zeros_like(each) if self._central else each
         return np.stack([single, single, each])
 
-    def approximate_quantile(self, probabilities: ArrayLike) -> Array:
-        """Quantiles as of `quantile`, of the scaled χ²; for the larger, the larger quantile."""
-        factor, freedom = (each[:, None] for each in self.chi_squared)
-        beyond = 1 - np.asarray(probabilities, dtype=float)
-        each = np.sqrt(scipy.special.chdtri(freedom, beyond) * factor)
-        return np.vstack([each, each.max(axis=0)])
-
-    def _scores_with_offset(self, at: Array) -> Array:
+    def _scores(self, at: Array) -> Array:
         """Normal scores of the shares below bounds exp(at) of roll, of pitch and of the larger."""
-        roll, pitch, (near, far) = (self._ends(bounds) for bounds in np.exp(at))
-        ends = np.stack([roll[:, 0], pitch[:, 1], [near.max(axis=0), far.min(axis=0)]], axis=1)
-        below = self._length(ends[1]) - (self._length(ends[0]) if ends[0].any() else 0.0)
+        roll, pitch, both = np.exp(at)
+        if self._central:
+            shares = [self._exact(0, roll), self._exact(1, pitch), self._share_of_both(both)]
+            return np.asarray(scipy.special.ndtri(shares))
+        near, far = self._ends(both)
+        larger = np.stack([near.max(axis=0), far.min(axis=0)])
+        ends = np.stack([self._ends(roll)[:, 0], self._ends(pitch)[:, 1], larger], axis=1)
+        below = self._length(ends[1]) - self._length(ends[0])
         return np.asarray(scipy.special.ndtri(np.maximum(below, 0.0).mean(axis=2)))
 
     def _share_of_both(self, bounds: Array) -> Array:
-        """Share of the larger error that is below bounds (k,), without offset."""
+        """Share of the larger error that is below bounds (k,), without offset.
+
+        By directions, corrected by what they miss of the shares of roll and pitch by themselves.
+        """
         single = self._length(self._ends(bounds)[1])
         both, mean = single.min(axis=0), single.mean(axis=2)
-        larger, exact = both.mean(axis=1), [self._exact(angle, bounds) for angle in (0, 1)]
+        missed, larger = [self._exact(a, bounds) for a in (0, 1)] - mean, both.mean(axis=1)
         for i, each in enumerate(both):
             apart = single[:, i] - mean[:, i, None]
             slope = np.linalg.lstsq(apart @ apart.T, apart @ (each - larger[i]), rcond=1e-9)[0]
-            larger[i] += slope @ [exact[a][i] - mean[a, i] for a in (0, 1)]
+            larger[i] += slope @ missed[:, i]
         return np.asarray(larger)
 
     def _ends(self, bounds: Array) -> Array:
@@ -253,8 +236,8 @@ class TiltDistribution:
         return np.clip((weights @ transform).real / bounds**2, 0.0, 1.0)
 
 
-def _solved(scores: Callable[[Array], Array], start: Array, wanted: Array) -> tuple[Array, Array]:
-    """Solve for arguments of wanted normal scores; return these, and the slopes there.
+def _solved(scores: Callable[[Array], Array], start: Array, wanted: Array) -> Array:
+    """Arguments of wanted normal scores.
 
     By the secant method. A step that leaves the bounds seen so far ends half way between them.
     """
@@ -268,8 +251,8 @@ def _solved(scores: Callable[[Array], Array], start: Array, wanted: Array) -> tu
             low = np.where(here < wanted, np.maximum(low, at), low)
             high = np.where(here > wanted, np.minimum(high, at), high)
             found = (here - below) / (at - before)
-            told = np.isfinite(found) & (found > 0) & (np.abs(at - before) > LEAST_STEP)
-            slope = np.where(told, found, slope)
+            known = np.isfinite(found) & (found > 0) & (np.abs(at - before) > LEAST_STEP)
+            slope = np.where(known, found, slope)
             # Where a share is 0 or 1, the quantile is some way further.
             step = np.where(np.isfinite(here), (wanted - here) / slope, -0.1 * np.sign(here))
             to = at + np.clip(step, -1.0, 1.0)
@@ -278,7 +261,7 @@ def _solved(scores: Callable[[Array], Array], start: Array, wanted: Array) -> tu
             before, below, at = at, here, to
             if np.all(np.abs(at - before) < LAST_STEP):
                 break
-    return at, slope
+    return at
 
 
 def _squares(forms: Array, along: Array) -> Array:

@@ -43,6 +43,10 @@ def total_effects(
 ) -> tuple[Array, Array, Array]:
     """Total effects of independent normal inputs on the outputs of a function.
 
+    They are those of Jansen's estimator, with the half widths of their 95 % intervals, as SALib's
+    `sobol.analyze` has them. That takes a hundred times as long: it computes first-order effects as
+    well, and resamples the outputs anew for each input.
+
     Parameters
     ----------
     function : takes (N, d), d inputs, and returns (N, k)
@@ -60,21 +64,25 @@ def total_effects(
     mean, sigma = np.asarray(mean, dtype=float), np.asarray(sigma, dtype=float)
     varied = np.flatnonzero(sigma > 0)
     normal = _standard_normal(len(varied), base_samples, seed + 1)
+    shares = _resamples(base_samples, resamples, seed + 1)
     inputs = np.tile(mean, (len(normal), 1))
     inputs[:, varied] += sigma[varied] * normal
     outputs = function(inputs)
-
-    total = np.full((outputs.shape[1], len(mean)), np.nan)
-    ci95 = np.full_like(total, np.nan)
-    shares = _resamples(base_samples, resamples, seed + 1)
+    found = np.zeros((2, outputs.shape[1], len(mean)))
     for k, values in enumerate(outputs.T):
         if values.var() <= NEGLIGIBLE_VARIANCE:
+            found[:, k] = np.nan
             continue
-        total[k] = ci95[k] = 0.0
-        total[k, varied], ci95[k, varied] = _total_effects(
-            (values - values.mean()) / values.std(), shares
-        )
-    return total, ci95, outputs.std(axis=0)
+        for _ in range(2):  # twice, as SALib does, for the same bits
+            values = (values - values.mean()) / values.std()
+        base, *mixed, other = values.reshape(base_samples, -1).T
+        variance = np.var(np.concatenate([base, other]))
+        means = np.array([base + other, base**2 + other**2]) @ shares / 2
+        squares = np.array([(base - each) ** 2 for each in mixed])
+        found[0, k, varied] = [0.5 * each.mean() / variance for each in squares]
+        resampled = 0.5 * (squares @ shares) / (means[1] - means[0] ** 2)
+        found[1, k, varied] = Z95 * resampled.std(axis=1, ddof=1)
+    return found[0], found[1], outputs.std(axis=0)
 
 
 @lru_cache(maxsize=1)  # the same at every attitude
@@ -83,12 +91,9 @@ def _standard_normal(d: int, base_samples: int, seed: int) -> Array:
     # Slow to import, and figures need only the names of this module.
     from SALib.sample import sobol
 
-    problem = {
-        "num_vars": d,
-        "names": [str(i) for i in range(d)],
-        "bounds": [[0.0, 1.0]] * d,
-        "dists": ["norm"] * d,
-    }
+    names = [str(i) for i in range(d)]
+    bounds, kinds = [[0.0, 1.0]] * d, ["norm"] * d
+    problem = {"num_vars": d, "names": names, "bounds": bounds, "dists": kinds}
     samples = sobol.sample(problem, base_samples, calc_second_order=False, seed=seed)
     samples.flags.writeable = False
     return samples
@@ -100,27 +105,6 @@ def _resamples(base_samples: int, resamples: int, seed: int) -> Array:
     drawn = np.random.default_rng(seed).integers(base_samples, size=(base_samples, resamples))
     counts = [np.bincount(each, minlength=base_samples) for each in drawn.T]
     return np.column_stack(counts) / base_samples
-
-
-def _total_effects(values: Array, shares: Array) -> tuple[Array, Array]:
-    """Total effects by Jansen's estimator, with the half widths of their 95 % intervals.
-
-    The numbers are those of SALib's `sobol.analyze`, which takes a hundred times as long: it
-    computes first-order effects as well, and resamples the outputs anew for each input.
-
-    Parameters
-    ----------
-    values : (N (d + 2),) array, the output at each of `_standard_normal`, of mean 0 and sd 1
-    shares : (N, b) array of `_resamples`
-    """
-    values = (values - values.mean()) / values.std()  # once more, as SALib does, for the same bits
-    base, *mixed, other = values.reshape(len(shares), -1).T
-    variance = np.var(np.concatenate([base, other]))
-    means = np.array([base + other, base**2 + other**2]) @ shares / 2
-    squares = np.array([(base - each) ** 2 for each in mixed])
-    total = np.array([0.5 * each.mean() / variance for each in squares])
-    resampled = 0.5 * (squares @ shares) / (means[1] - means[0] ** 2)
-    return total, Z95 * resampled.std(axis=1, ddof=1)
 
 
 def leveling_function(
@@ -211,19 +195,12 @@ def effects_table(
     sd : (a, 2) array, rad, of roll and of pitch
     effects : mapping of column to (a, 2, d) array; NaN where they are not defined
     """
-    grid = pd.MultiIndex.from_product(
-        [[*product(map(float, roll_gon), map(float, pitch_gon))], OUTPUTS, names],
-        names=["attitude", "output", "input"],
-    ).to_frame(index=False)
+    attitudes = [*product(map(float, roll_gon), map(float, pitch_gon))]
+    rows = [(out, *at, name) for at in attitudes for out in OUTPUTS for name in names]
+    table = pd.DataFrame(rows, columns=["output", "roll_gon", "pitch_gon", "input"])
     defined = np.isfinite(next(iter(effects.values()))).all(axis=2)
-    return pd.DataFrame(
-        {
-            "output": grid["output"],
-            "roll_gon": grid["attitude"].str[0],
-            "pitch_gon": grid["attitude"].str[1],
-            "input": grid["input"],
-            **{column: each.ravel() for column, each in effects.items()},
-            "sd_output_mgon": np.repeat(sd.ravel() / MGON, len(names)),
-            "defined": np.repeat(defined.ravel(), len(names)),
-        }
+    return table.assign(
+        **{column: each.ravel() for column, each in effects.items()},
+        sd_output_mgon=np.repeat(sd.ravel() / MGON, len(names)),
+        defined=np.repeat(defined.ravel(), len(names)),
     )

@@ -15,11 +15,11 @@ from accelstudy.approaches import get_approach
 from accelstudy.basics.arguments import tidy
 from accelstudy.basics.progress import track
 from accelstudy.design.information import Information, position_rows
+from accelstudy.design.search import Search
 from accelstudy.effects import HoldConditions
 from accelstudy.leveling.distribution import Tilt
 from accelstudy.leveling.error import ATTITUDES, TiltError, cap_forces, tilt_error
 from accelstudy.planning.question import Equipment, Question
-from accelstudy.proposal.request import Request
 from accelstudy.schemes import Scheme, get_scheme, scheme_names
 from accelstudy.sensors.models import MODELS, NINE, get_model
 from accelstudy.sensors.sensor import SensorModel
@@ -50,7 +50,7 @@ OF_RIG = ("base_tilt", "encoder_scale", "encoder_offset", "gravity_error")
 FAMILY = "fibonacci"
 SIZES = (*range(4, 25), 27, *range(30, 61, 5), *range(70, 101, 10), *range(120, 401, 40))
 """Family of evenly spread positions, and the sizes of it that are tried. They show about how many
-positions are needed; `accelstudy.planning.best_positions` seeks the fewest."""
+positions are needed; `accelstudy.planning.fewest` seeks the fewest."""
 LEAST_REDUNDANCY = 0.25
 """Least share of redundant conditions; with fewer a wrong position would not be noticed."""
 
@@ -68,8 +68,8 @@ class Candidate:
     sigma : float, m/s², of the mean of a position
     tilt : Tilt, that it leaves by linear theory
     redundancy : int
-    request : Request that finds its positions again, as `accelstudy design` does; None of a scheme
-        that has a name
+    search : Search that found its positions, from so many random sets; None of a known scheme
+    starts : int
     simulated : SimulatedTilt or None
     fewer : SimulatedTilt or None, of the best positions of which there is one less, and which miss
         the target
@@ -82,7 +82,8 @@ class Candidate:
     sigma: float
     tilt: Tilt = field(compare=False)
     redundancy: int
-    request: Request | None = None
+    search: Search | None = field(default=None, compare=False)
+    starts: int = 0
     simulated: SimulatedTilt | None = field(default=None, compare=False)
     fewer: SimulatedTilt | None = field(default=None, compare=False)
 
@@ -97,9 +98,9 @@ def sort_by_time(unsorted: Iterable[Candidate]) -> list[Candidate]:
     return sorted(unsorted, key=lambda c: (c.seconds, c.tilt.rms.max(), c.model.n_parameters))
 
 
-def schemes_for(most_positions: int, more: Sequence[str] = ()) -> list[Scheme]:
-    """Schemes of the literature, evenly spread ones, and more, in the order of their size."""
-    names = {*scheme_names(), *(f"{FAMILY}-{n}" for n in SIZES), *more}
+def schemes_for(most_positions: int) -> list[Scheme]:
+    """Schemes of the literature, and evenly spread ones, in the order of their size."""
+    names = {*scheme_names(), *(f"{FAMILY}-{n}" for n in SIZES)}
     schemes = [get_scheme(name) for name in sorted(names)]
     fitting = [scheme for scheme in schemes if scheme.n_positions <= most_positions]
     return sorted(fitting, key=lambda scheme: (scheme.n_positions, scheme.name))
@@ -107,27 +108,20 @@ def schemes_for(most_positions: int, more: Sequence[str] = ()) -> list[Scheme]:
 
 def candidates(question: Question) -> list[Candidate]:
     """All calibrations in known schemes whose positions determine their model and check it."""
-    schemes = schemes_for(question.most_positions, question.schemes)
+    schemes = schemes_for(question.most_positions)
     return [c for scheme in track(schemes, "calibrations") for c in in_scheme(question, scheme)]
 
 
 def shortest(question: Question) -> Candidate | None:
     """Quickest calibration without limits of time and positions; None if there is none."""
     free = replace(question, most_seconds=math.inf, most_positions=SIZES[-1])
-    first: dict[str, Candidate] = {}
-    for scheme in schemes_for(free.most_positions, free.schemes):
-        for candidate in sort_by_time(in_scheme(free, scheme)):
-            first.setdefault(candidate.equipment.name, candidate)
-        if len(first) == len(question.equipment):
-            break
-    return min(first.values(), key=lambda c: c.seconds, default=None)
+    return next(iter(sort_by_time(candidates(free))), None)
 
 
 def in_scheme(
     question: Question,
     scheme: Scheme,
     models: Sequence[SensorModel] | None = None,
-    request: Request | None = None,
 ) -> Iterator[Candidate]:
     """Candidates in one scheme, with each equipment, of `PLANNED_MODELS` or other models."""
     models = models or [get_model(name) for name in PLANNED_MODELS]
@@ -141,7 +135,7 @@ def in_scheme(
             # With a single noise, errors are in proportion to it.
             for model, tilt, redundancy in tilts(1.0 if single else sigma):
                 own = tilt.with_noise(sigma) if single else tilt
-                yield Candidate(equipment, model, scheme, hold, sigma, own, redundancy, request)
+                yield Candidate(equipment, model, scheme, hold, sigma, own, redundancy)
 
 
 def _tilts(

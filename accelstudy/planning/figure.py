@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.lines import Line2D
@@ -35,49 +37,38 @@ def draw_plan(ax: Axes, answer: Answer) -> None:
         ax.scatter(*at, s=3, alpha=0.18, linewidth=0, rasterized=True, color=colour, zorder=2)
         front = chosen[left[chosen] < np.minimum.accumulate([np.inf, *left[chosen]])[:-1]]
         ax.step(minutes[front], left[front], where="post", color=colour, zorder=3)
-    above = dict.fromkeys(question.equipment, False)
     for number, candidate in enumerate(answer.ranked, 1):
-        if candidate.simulated is None:
-            continue
-        name, time = candidate.equipment, candidate.seconds / 60
-        colour, marker = approach_colour(name.name), approach_marker(name.name)
+        assert candidate.simulated is not None
+        name, time = candidate.equipment.name, candidate.seconds / 60
         place = time, float(to_display(question.accuracy(candidate.simulated), "rad"))
-        ax.plot(*place, marker=marker, ms=5, mfc="white", mec=colour, ls="", zorder=5)
+        ax.plot(*place, marker=approach_marker(name), ms=5, mfc="white",
+                mec=approach_colour(name), ls="", zorder=5)  # fmt: skip
         ax.annotate(
-            str(number), place, xytext=(0, 11 if above[name] else -11), textcoords="offset points",
-            ha="center", va="center", color=colour, zorder=6,
+            str(number), place, xytext=(0, 11 if number % 2 else -11), textcoords="offset points",
+            ha="center", va="center", color=approach_colour(name), zorder=6,
             bbox={"facecolor": "white", "edgecolor": "none", "pad": 0.5, "alpha": 0.8},
         )  # fmt: skip
-        above[name] = not above[name]  # neighbours have their numbers on either side
-
+    wanted = f"wanted: {quantity_text(question.target, 'rad')}"
     ax.axhline(target, color=INK, linewidth=0.8, linestyle="--", zorder=1)
-    ax.annotate(
-        f"wanted: {quantity_text(question.target, 'rad')}", (1, target),
-        xycoords=("axes fraction", "data"), xytext=(-2, 2), textcoords="offset points",
-        ha="right", va="bottom",
-    )  # fmt: skip
-    near = left < IN_SIGHT * target
-    shown = near if near.any() else np.ones_like(near)
-    values, times = [*left[shown], target], minutes[shown] if len(minutes) else [1.0, 10.0]
-    low, high = min(values) / 1.3, max(values) * 1.2
+    ax.annotate(wanted, (1, target), xycoords=("axes fraction", "data"), xytext=(-2, 2),
+                textcoords="offset points", ha="right", va="bottom")  # fmt: skip
+    shown = left < IN_SIGHT * target if (left < IN_SIGHT * target).any() else left < np.inf
+    times = minutes[shown] if len(minutes) else np.array([1.0, 10.0])
+    low, high = min(target, *left[shown]) / 1.3, max(target, *left[shown]) * 1.2
     ax.set(xscale="log", yscale="log", ylim=(low, high))
-    ax.set_xlim(min(times) / 1.2, max(times) * 1.2)
-    log_ticks(ax.xaxis, min(times), max(times))
+    ax.set_xlim(times.min() / 1.2, times.max() * 1.2)
+    log_ticks(ax.xaxis, times.min(), times.max())
     log_ticks(ax.yaxis, low, high)
     measure = "rms" if share is None else f"both angles stay below in {100 * share:g} %"
     ax.set_xlabel("time in the field / minutes")
     ax.set_ylabel(f"tilt error left, {measure} / {display_unit('rad')}")
-    best = [
-        Line2D([], [], color=approach_colour(e.name), label=f"best {LABELS[e.name]}")
+    looks: list[dict[str, Any]] = [
+        {"color": approach_colour(e.name), "label": f"best {LABELS[e.name]}"}
         for e in question.equipment
     ]
-    dot = Line2D(
-        [], [], color="#777777", marker="o", ms=2, ls="", alpha=0.6,
-        label="other schemes, models, durations of a hold",
-    )  # fmt: skip
-    circle = Line2D(
-        [], [], color=INK, marker="o", mfc="white", ls="",
-        label="simulated, with its number in the table",
-    )  # fmt: skip
-    handles = [*best, dot, circle]
+    looks.append({"color": "#777777", "marker": "o", "ms": 2, "ls": "", "alpha": 0.6,
+                  "label": "other schemes, models, durations of a hold"})  # fmt: skip
+    looks.append({"color": INK, "marker": "o", "mfc": "white", "ls": "",
+                  "label": "simulated, with its number in the table"})  # fmt: skip
+    handles = [Line2D([], [], **look) for look in looks]
     ax.legend(handles=handles, loc="lower left", bbox_to_anchor=(0, 1), ncols=2)

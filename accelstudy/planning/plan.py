@@ -15,17 +15,17 @@ from accelstudy.basics.plugins import file_key
 from accelstudy.basics.progress import begin, say, show
 from accelstudy.basics.suggestions import study_again
 from accelstudy.basics.units import MGON
-from accelstudy.data_sheets import sheet_of_sigma
+from accelstudy.data_sheets import get_data_sheet, sheet_of_sigma
+from accelstudy.design.order import field_order
 from accelstudy.drawing.style import FULL
 from accelstudy.files.outputs import PLAN
-from accelstudy.leveling.distribution import NOISE
 from accelstudy.pages.result import Result
 from accelstudy.planning import wording
 from accelstudy.planning.answer import Answer, answer
 from accelstudy.planning.candidates import Candidate
-from accelstudy.planning.question import Equipment, Question, get_sensor
+from accelstudy.planning.design import write_scheme
+from accelstudy.planning.question import Equipment, Question
 from accelstudy.planning.reasons import limits
-from accelstudy.proposal.order import field_order
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -36,7 +36,7 @@ STUDY_HEAD = """\
 # The simulated candidates of a plan as a study, made by `accelstudy plan`. It reproduces their
 # numbers: {command}
 """
-ANGLES = ("roll", "pitch")
+ANGLES, UNKNOWN = ("roll", "pitch"), np.full(2, np.nan)
 
 
 class Plan(Result):
@@ -65,7 +65,7 @@ class Plan(Result):
         if (sensor is None) == (sigma is None):
             both = ", not both" if sensor else ""
             raise InputError(f"plan: give the sensor by `sensor`, or its noise by `sigma`{both}")
-        sheet = get_sensor(sensor) if sigma is None else sheet_of_sigma(sigma)
+        sheet = get_data_sheet(sensor) if sigma is None else sheet_of_sigma(sigma)
         if given["history"] is not None:
             from accelstudy.data_sheets.measured import with_history  # slow to import
 
@@ -80,7 +80,6 @@ class Plan(Result):
             given["robot_sigma"],
             math.inf if max_time is None else max_time,
             given["max_positions"],
-            given["schemes"],
         )
         begin("comparing calibrations, which takes some seconds ...")
         return cls(answer(asked, given["seed"], given["replicates"]))
@@ -149,51 +148,30 @@ class Plan(Result):
         study = {**file_key(), **self.answer.study}
         content = yaml.safe_dump(study, sort_keys=False, allow_unicode=True)
         (folder / "study.yaml").write_text(head + content, encoding="utf-8")
-        (folder / "plan.md").write_text(self._page(), encoding="utf-8")
-        self._write_positions(folder / "positions.yaml")
+        first = self.answer.first
+        directions = first.scheme.directions
+        if first.search is not None:
+            directions = directions[field_order(first.search.task, directions)]
+        made = wording.positions_command(first), directions, {"made_by": "accelstudy plan"}
+        write_scheme(folder / "positions.yaml", "plan", "of plan", *made)
         with mpl.rc_context(STYLE):  # type: ignore[arg-type]
             figure = new_figure(*self.size)
             self.draw(figure.subplots())
         for name in ("plan.svg", "plan.png"):
             save(figure, folder / name, "Plan", DPI)
 
-    def _write_positions(self, path: Path) -> None:
-        """Write the recommended positions as a scheme, in the order in which to take them."""
-        from accelstudy.proposal.design import write_design
-
-        question, first = self.answer.question, self.answer.first
-        directions = first.scheme.directions
-        if first.request is not None:
-            directions = directions[field_order(first.request.task, directions)]
-        command, made = wording.positions_command(question, first), {"made_by": "accelstudy plan"}
-        write_design(path, "plan", "of plan", command, directions, made)
-
-    def _parts(self) -> tuple[str, ...]:
-        """What to do, how to, the table, the reasons and the assumptions, as text."""
-        answer, how_to, reasons, assumptions = (
-            "\n".join(wording.part_lines(part, self.answer))
-            for part in ("answer", "how_to", "reasons", "assumptions")
-        )
-        return answer, how_to, "\n".join(wording.table_lines(self.answer)), reasons, assumptions
-
-    def _page(self) -> str:
-        """The plan as a page in Markdown."""
-        answer, how_to, table, reasons, assumptions = self._parts()
-        first, _, rest = answer.partition("\n")
-        figure = "![Tilt accuracy over effort](plan.svg)"
-        assumed = "\n".join(f"* {line}" for line in assumptions.splitlines())
-        parts = f"# {first}", rest, how_to, f"```\n{table}\n```", figure, f"```\n{reasons}\n```"
-        return "\n\n".join([*parts, assumed]) + "\n"
-
     def tell(self, place: Path | None) -> None:
         """Print the answer, the table and the assumptions."""
         if not self.answer.ranked:
             show(self.verdict)
             return
-        answer, how_to, table, reasons, assumptions = self._parts()
+        answer, how_to, reasons, assumptions = (
+            "\n".join(wording.part_lines(part, self.answer))
+            for part in ("answer", "how_to", "reasons", "assumptions")
+        )
+        table = "\n".join(wording.table_lines(self.answer))
         show(f"{answer}\n\n{how_to}")
-        say(f"\n{table}\n\n{reasons}")
-        say(f"\n{assumptions}\n")
+        say(f"\n{table}\n\n{reasons}\n\n{assumptions}\n")
         if place is None:
             study = "a study that makes the numbers again"
             say(f"--out FOLDER keeps the table, the figure, and {study}.")
@@ -204,12 +182,7 @@ class Plan(Result):
 
 def _row(answer: Answer, c: Candidate) -> dict[str, Any]:
     rank = answer.ranked.index(c) + 1 if c in answer.ranked else None
-    expected = {"rms": c.tilt.rms, "noise": np.sqrt(c.tilt.squares[NOISE])}
-    found, of_both = dict.fromkeys(("rms", "rms_error", "rms_q95"), np.full(2, np.nan)), np.nan
-    if c.simulated is not None:
-        values = c.simulated.rms, c.simulated.error, c.simulated.quantile(0.95)
-        found, of_both = dict(zip(found, values, strict=True)), c.simulated.quantile_of_both(0.95)
-    return {
+    row = {
         "equipment": c.equipment.name,
         "model": c.model.name,
         "n_parameters": c.model.n_parameters,
@@ -219,19 +192,15 @@ def _row(answer: Answer, c: Candidate) -> dict[str, Any]:
         "sensor_sigma_mps2": c.sigma,
         "minutes": c.seconds / 60,
         "redundancy": c.redundancy,
-        **{
-            f"{angle}_{what}_mgon": float(values[i]) / MGON
-            for i, angle in enumerate(ANGLES)
-            for what, values in expected.items()
-        },
         "reaches": answer.question.reached_by(c.tilt),
         "rank": rank,
         "limited_by": limits(answer.question, c) if rank else None,
         "cell": None if c.simulated is None else c.simulated.cell,
-        **{
-            f"{angle}_{what}_simulated_mgon": float(values[i]) / MGON
-            for what, values in found.items()
-            for i, angle in enumerate(ANGLES)
-        },
-        "both_rms_q95_simulated_mgon": of_both / MGON,
     }
+    left = {"rms": c.tilt.rms, "rms_simulated": UNKNOWN, "rms_q95_simulated": UNKNOWN}
+    both = np.nan
+    if c.simulated is not None:
+        left |= {"rms_simulated": c.simulated.rms, "rms_q95_simulated": c.simulated.quantile(0.95)}
+        both = c.simulated.quantile_of_both(0.95)
+    angles = {f"{a}_{k}_mgon": v[i] / MGON for k, v in left.items() for i, a in enumerate(ANGLES)}
+    return {**row, **angles, "both_rms_q95_simulated_mgon": both / MGON}

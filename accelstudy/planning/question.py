@@ -5,26 +5,23 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 from functools import cached_property
-from pathlib import Path
 from typing import TYPE_CHECKING
 
-from accelstudy.basics.errors import InputError, key
-from accelstudy.data_sheets import DataSheet, get_data_sheet, read_data_sheet
+from accelstudy.basics.arguments import tidy
+from accelstudy.data_sheets import DataSheet
 from accelstudy.effects import get_effect
 from accelstudy.planning.quantities import QUANTITIES
-from accelstudy.schemes import Scheme, get_scheme, is_scheme_file
 
 if TYPE_CHECKING:
     from accelstudy.leveling.distribution import Tilt
     from accelstudy.planning.simulated import SimulatedTilt
+    from accelstudy.sensors.sensor import SensorModel
 
 HOLDS = (1.0, 2.0, 5.0, 10.0, 20.0, 30.0, 60.0, 120.0)
 """Durations of a hold that are tried, s."""
 USUAL_HOLD = 10.0
 """s, for a sensor of which only the noise of a position is known."""
 NONLINEAR = ("quadratic_scale", "cubic_scale")
-LOGS = (".csv", ".txt", ".gz", ".mat", ".parquet", ".log", ".dat")
-"""Endings of files that are no data sheets, though one can be made of them."""
 
 
 @dataclass(frozen=True)
@@ -73,7 +70,6 @@ class Question:
     sigma_angle : float, rad, of the robot's roll and pitch
     most_seconds : float, s in the field
     most_positions : int
-    schemes : tuple of str, names or files of schemes besides those that are always compared
     """
 
     target: float
@@ -85,7 +81,6 @@ class Question:
     sigma_angle: float = QUANTITIES["robot_sigma"].value
     most_seconds: float = math.inf
     most_positions: int = 200
-    schemes: tuple[str, ...] = ()
 
     def __post_init__(self) -> None:
         if not self.holds:
@@ -106,6 +101,11 @@ class Question:
             effect: usual_size(effect) if size is None else shares[effect] * size
             for effect, size in stated.items()
         }
+
+    def neglected_by(self, model: SensorModel) -> dict[str, float]:
+        """Effects that a model lacks and the sensor has, with their sizes to six digits."""
+        inside = [effect.name for effect in model.effects]
+        return {e: tidy(size, 6) for e, size in self.sizes.items() if size and e not in inside}
 
     @property
     def assumed(self) -> list[str]:
@@ -130,52 +130,8 @@ class Question:
             return False
         return self.accuracy(tilt) <= self.target
 
-    def scheme_text(self, scheme: Scheme) -> str:
-        """Name of a scheme in commands and configurations: a name, or the path of its file."""
-        for text in self.schemes:
-            if is_scheme_file(text) and get_scheme(text).name == scheme.name:
-                return str(Path(text).resolve())
-        return scheme.name
-
-
-def confidence_of(text: str) -> float | None:
-    """Share of the calibrations that a text tells, ``95%`` or ``0.95``; None for ``rms``."""
-    if text == "rms":
-        return None
-    try:
-        share = float(text.removesuffix("%")) / (100 if text.endswith("%") else 1)
-    except ValueError:
-        share = math.nan
-    if not 0.5 <= share <= 0.999:
-        raise InputError(
-            f"{key('confidence')}: must be rms, or a share from 50% to 99.9% of the calibrations, "
-            f"not {text!r}"
-        )
-    return share
-
 
 def usual_size(effect: str) -> float:
     """Size of an effect between that in good and that in cheap equipment, SI."""
     low, high = get_effect(effect).typical
     return math.sqrt(low * high)
-
-
-def get_sensor(text: str) -> DataSheet:
-    """Return a sensor by its name, from a YAML file, or from the folder of a campaign.
-
-    Raises
-    ------
-    InputError
-        If there is no such sensor; for a log the message says how to make a data sheet of it.
-    """
-    path = Path(text)
-    if path.is_dir():
-        from accelstudy.data_sheets.measured import sheet_of_campaign
-
-        return sheet_of_campaign(path)
-    if path.suffix in LOGS:
-        raise InputError(
-            f"{text}: a log, not a data sheet; make one of it: accelstudy data-sheet {text} --out "
-            f"{path.stem}.yaml, with the options by which import reads it"
-        )
-    return read_data_sheet(path) if path.is_file() else get_data_sheet(text)

@@ -33,6 +33,8 @@ PLAIN = {
     "gravity_error": "wrong value of gravity",
 }
 """Effects in plain words."""
+READING, HOURS, KELVIN = 1.0, 8.0, 10.0
+"""Use: s of a reading, h since the calibration, and K off its temperature."""
 
 
 @dataclass(frozen=True)
@@ -59,30 +61,6 @@ class Spoiler:
 def effect_unit(effect: str) -> str:
     """SI unit of the parameters of an effect."""
     return get_effect(effect).parameters[0].unit
-
-
-@dataclass(frozen=True)
-class InUse:
-    """What adds to a calibration's tilt error when the sensor is used; sds of roll or pitch, rad.
-
-    Attributes
-    ----------
-    reading : float, by the noise of one reading; NaN if that is not known
-    seconds : float, s, duration of the reading
-    drift : float, by the drift of the bias since the calibration; NaN if that is not known
-    hours : float, h, since the calibration
-    warmth : float, by bias and scale at another temperature; NaN if neither is known
-    kelvin : float, K, difference in temperature
-    restart : float, by the bias after switching off and on; NaN if that is not known
-    """
-
-    reading: float
-    seconds: float
-    drift: float
-    hours: float
-    warmth: float
-    kelvin: float
-    restart: float
 
 
 def limits(question: Question, candidate: Candidate) -> str:
@@ -136,28 +114,31 @@ def _tilt(question: Question, candidate: Candidate, sizes: Mapping[str, float]) 
     return tilt
 
 
-def errors_in_use(
-    question: Question, seconds: float = 1.0, hours: float = 8.0, kelvin: float = 10.0
-) -> InUse:
-    """Tilt errors in use that add to that of the calibration."""
+def errors_in_use(question: Question, kelvin: float = KELVIN) -> dict[str, float]:
+    """Tilt errors in use that add to that of the calibration, rms of the worse angle, rad.
+
+    By the noise of a reading of `READING`, by the drift of the bias within `HOURS` since the
+    calibration, by bias and scale at another temperature, and by switching off and on. NaN where
+    the data sheet tells nothing of it.
+    """
     sheet = question.sheet
     quadratic, columns = error_up_to(question.tilt_range).quadratic, every_effect()[1]
 
-    def tilt(**sigmas: float) -> float:
-        """Rms of the worse angle that independent errors of each axis leave; by effect, SI."""
+    def tilt(known: bool = True, **sigmas: float) -> float:
+        """What independent errors of each axis leave; by effect, SI."""
         variance = np.zeros(len(quadratic[0]))
         for effect, sigma in sigmas.items():
             variance[columns[effect]] = sigma**2
-        return float(np.sqrt(np.einsum("auu,u->a", quadratic, variance).max()))
+        left = float(np.sqrt(np.einsum("auu,u->a", quadratic, variance).max()))
+        return left if known else math.nan
 
-    drift = warmth = restart = math.nan
     changes = (sheet.bias_instability, sheet.acceleration_random_walk, sheet.bias_rate)
-    if any(change is not None for change in changes):
-        drift = tilt(bias=sheet.bias_change(hours * 3600))
-    if sheet.bias_per_kelvin is not None or sheet.scale_per_kelvin is not None:
-        bias, scale = sheet.temperature_sigmas(kelvin)
-        warmth = tilt(bias=bias, scale=scale)
-    if sheet.repeatability is not None:
-        restart = tilt(bias=sheet.bias_change(0.0, restarted=True))
-    reading = tilt(bias=sheet.sigma_mean(seconds))
-    return InUse(reading, seconds, drift, hours, warmth, kelvin, restart)
+    warm = (sheet.bias_per_kelvin, sheet.scale_per_kelvin)
+    bias, scale = sheet.temperature_sigmas(kelvin)
+    restart = sheet.repeatability is not None
+    return {
+        "reading": tilt(bias=sheet.sigma_mean(READING)),
+        "drift": tilt(any(c is not None for c in changes), bias=sheet.bias_change(HOURS * 3600)),
+        "warmth": tilt(any(c is not None for c in warm), bias=bias, scale=scale),
+        "restart": tilt(restart, bias=sheet.bias_change(0.0, restarted=True)),
+    }

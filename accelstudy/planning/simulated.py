@@ -82,7 +82,7 @@ def study_of(
     sigma = chosen[0].sigma
     planned = ("cross_axis_misalignment", *NONLINEAR)
     sensor = {effect: _quantity(question, effect) for effect in (*BASE_EFFECTS, *planned)}
-    names = [candidate.scheme.name for candidate in chosen if candidate.request]
+    names = [candidate.scheme.name for candidate in chosen if candidate.search]
     of_files = {name: held(name) for name in names}
     has = [effect for effect in planned if any(sensor[effect]["value"])]
     return {
@@ -105,7 +105,7 @@ def study_of(
         "grids": [
             {
                 "models": candidate.model.name,
-                "schemes": question.scheme_text(candidate.scheme),
+                "schemes": candidate.scheme.name,
                 "approaches": candidate.equipment.name,
                 "replicates": replicates,
                 **({} if candidate.sigma == sigma else {"sensor_sigma_mps2": candidate.sigma}),

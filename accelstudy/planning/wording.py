@@ -5,19 +5,30 @@ The sentences stand in `wording.txt.j2`; here are the phrases of which it makes 
 
 from __future__ import annotations
 
-import shlex
 import sys
 
 import numpy as np
 
-from accelstudy.basics.units import GON, MGON, angle_note, display_unit, to_display  # noqa: F401
+from accelstudy.basics.units import (  # noqa: F401
+    GON,
+    MGON,
+    angle_note,
+    display_unit,
+    recorded_unit,
+    to_display,
+    to_recorded,
+)
 from accelstudy.basics.wording import amount, interval, number, quantity_text, words
+from accelstudy.design.criteria import MINIMAX
 from accelstudy.pages import render_lines
 from accelstudy.planning.answer import Answer
 from accelstudy.planning.candidates import Candidate, shortest  # noqa: F401
 from accelstudy.planning.question import Question
 from accelstudy.planning.reasons import (  # noqa: F401
+    HOURS,
+    KELVIN,
     PLAIN,
+    READING,
     effect_unit,
     errors_in_use,
     limits,
@@ -63,17 +74,17 @@ def table_lines(answer: Answer) -> list[str]:
         *("  ".join(cells).rstrip() for cells in zip(*aligned, strict=True)),
         "model: number of parameters, and effects besides bias, scale and angles between axes;",
         "roll, pitch: rms, and interval with 95 of 100 calibrations of each angle by itself, from",
-        f"{answer.replicates} simulated ones each; ~ by linear theory;",
+        f"{answer.replicates} simulated ones each;",
         "both: what roll and pitch both stay below in 95 of 100 calibrations",
     ]
 
 
 def _row(answer: Answer, rank: int, candidate: Candidate) -> list[str]:
-    source = candidate.simulated or candidate.tilt
-    about = "" if candidate.simulated else "~"
-    ends = (source.rms, source.quantile(0.025), source.quantile(0.975))
+    left = candidate.simulated
+    assert left is not None
+    ends = (left.rms, left.quantile(0.025), left.quantile(0.975))
     cells = [
-        f"{about}{number(rms)} ({interval(low, high)})"
+        f"{number(rms)} ({interval(low, high)})"
         for rms, low, high in zip(*(to_display(v, "rad") for v in ends), strict=True)
     ]
     return [
@@ -85,7 +96,7 @@ def _row(answer: Answer, rank: int, candidate: Candidate) -> list[str]:
         f"{candidate.hold:g}",
         f"{candidate.seconds / 60:.1f}",
         *cells,
-        f"{about}{amount(source.quantile_of_both(QUOTED), 'rad')}",
+        amount(left.quantile_of_both(QUOTED), "rad"),
         limits(answer.question, candidate),
     ]
 
@@ -100,22 +111,28 @@ def model_words(model: SensorModel) -> str:
     return " + ".join([str(model.n_parameters), *short])
 
 
-def positions_command(question: Question, candidate: Candidate) -> str:
+def positions_command(candidate: Candidate) -> str:
     """The command that shows, or finds again, the positions of a candidate."""
-    request = candidate.request
-    if request is None:
-        return f"accelstudy scheme {shlex.quote(question.scheme_text(candidate.scheme))}"
+    if candidate.search is None:
+        return f"accelstudy scheme {candidate.scheme.name}"
+    task = candidate.search.task
     options = {
-        "positions": str(request.positions),
-        "approach": request.approach,
-        "model": request.model,
-        "criterion": request.criterion,
-        "tilt-range": f"{request.tilt_range / GON:.6g}gon",
-        "sigma": f"{request.noise.sigma_force:.4g}m/s2",
-        "robot-sigma": f"{request.noise.sigma_angle / MGON:.6g}mgon",
-        "starts": str(request.starts),
+        "positions": str(candidate.scheme.n_positions),
+        "approach": candidate.equipment.name,
+        "model": candidate.model.name,
+        "criterion": MINIMAX,
+        "tilt-range": f"{task.tilt_range / GON:.6g}gon",
+        "sigma": f"{task.noise.sigma_force:.4g}m/s2",
+        "robot-sigma": f"{task.noise.sigma_angle / MGON:.6g}mgon",
+        "starts": str(candidate.starts),
         "out": "positions.yaml",
     }
     usual = {"model": NINE, "sigma": "0.002m/s2", "robot-sigma": "3.2mgon", "approach": "robot"}
     given = (f"--{name} {text}" for name, text in options.items() if text != usual.get(name))
-    return " ".join(["accelstudy design", *given])
+    neglected = [f"--neglect {e}={_recorded(size, e)}" for e, size in task.neglected.items()]
+    return " ".join(["accelstudy design", *given, *neglected])
+
+
+def _recorded(size: float, effect: str) -> str:
+    unit = effect_unit(effect)
+    return f"{float(to_recorded(size, unit)):.8g}{recorded_unit(unit)}"

@@ -64,7 +64,6 @@ class Advice(Result):
     suspects : tuple of int, numbers of positions that contradict the others; they are used
     calibration_state : str, state of a calibration with these positions; empty if there is none yet
     undetermined : tuple of str, parameters that the positions do not determine yet
-    vague : tuple of str, parameters known less well than the typical size in a cheap sensor
     noise : NoiseTaken
     rms : (2,) array, rad, of roll and of pitch; None as long as it is not known
     next : (3,) array, direction of gravity in the body frame in the position to take next
@@ -86,7 +85,6 @@ class Advice(Result):
     suspects: tuple[int, ...]
     calibration_state: str
     undetermined: tuple[str, ...]
-    vague: tuple[str, ...]
     noise: NoiseTaken
     rms: Array | None
     next: Array
@@ -128,7 +126,6 @@ class Advice(Result):
             "positions": self.positions,
             "in_conflict": self.suspects,
             "undetermined": self.undetermined,
-            "vague": self.vague,
             "to_go": self.to_go,
             "tilt": self.to_frame().reset_index().to_dict("records"),
             "command": self.command,

@@ -223,7 +223,6 @@ def advise(
         suspects=tuple(sorted(int(campaign.positions[s.position]) for s in suspects)),
         calibration_state="" if assessed is None else assessed.state,
         undetermined=() if known.determined else _undetermined(campaign, model, approach, known),
-        vague=_vague(model, known.information) if known.determined else (),
         noise=_noise_taken(known, campaign, trusted, noise.sigma_force),
         rms=rms if np.isfinite(rms).all() else None,
         next=directions[chooser.choose(known, rms, last)],
@@ -278,20 +277,14 @@ def _undetermined(
     campaign: Campaign, model: SensorModel, approach: Approach, known: Knowledge
 ) -> tuple[str, ...]:
     """Parameters that the positions do not determine better than their typical size."""
-    rows = known.information.rows
-    with_sizes = Information.of(rows, np.diag(1 / typical_sizes(model, rows.shape[1])))
-    hardly = _vague(model, with_sizes, KNOWN_RATIO)
-    if hardly or not campaign.n_positions:
-        return hardly
+    rows, u = known.information.rows, model.n_parameters
+    sizes = typical_sizes(model, rows.shape[1])
+    sigma = np.sqrt(np.diag(Information.of(rows, np.diag(1 / sizes)).covariance))
+    hardly = np.array(model.parameter_names)[(sigma > KNOWN_RATIO * sizes)[:u]]
+    if len(hardly) or not campaign.n_positions:
+        return tuple(hardly.tolist())
     theory = campaign_estimability(campaign, model, approach, sigma_to_show_above(campaign))
     return tuple(name for name in theory.not_estimable if name in model.parameter_names)
-
-
-def _vague(model: SensorModel, information: Information, ratio: float = 1.0) -> tuple[str, ...]:
-    """Parameters whose sigma is more than `ratio` of their size in a cheap sensor."""
-    sigma = np.sqrt(np.diag(information.covariance))[: model.n_parameters]
-    large = sigma > ratio * typical_sizes(model, model.n_parameters)
-    return tuple(np.array(model.parameter_names)[large].tolist())
 
 
 def _noise_taken(known: Knowledge, campaign: Campaign, trusted: bool, unit: float) -> NoiseTaken:

@@ -47,7 +47,7 @@ def candidate_positions(
     Parameters
     ----------
     name : str
-        One of `SETS`, or the path of a CSV file with the columns x, y, z or roll and pitch.
+        One of `SETS`, or a scheme, by its name or its file.
     pole_distance : float, rad, optional, least angle between the x axis and the vertical
     max_roll, max_pitch : float, rad, optional, largest roll and pitch either way
 

@@ -29,20 +29,6 @@ def read_running(folder: str | Path) -> Campaign:
         As `accelstudy.campaign.format.read_campaign`, but not for positions that are not
         there yet.
     """
-    campaign, ends = _read(folder, whole_lines=True)
-    if ends:
-        return campaign
-    try:
-        campaign, _ = _read(folder, whole_lines=False)
-        odd = "does not end; check that it is whole"
-    except InputError:
-        odd = "is not whole; it is not counted"
-    warning = f"{folder}: the last line of the table {odd}"
-    return replace(campaign, warnings=(*campaign.warnings, warning))
-
-
-def _read(folder: str | Path, whole_lines: bool) -> tuple[Campaign, bool]:
-    """Read a session, and whether its last line has an end."""
     folder = Path(folder)
     if not folder.is_dir():
         raise InputError(
@@ -54,19 +40,25 @@ def _read(folder: str | Path, whole_lines: bool) -> tuple[Campaign, bool]:
         text = read_text(path) if path.exists() else ""
     except UnicodeDecodeError as error:  # the last character may be incomplete
         raise InputError(f"{path}: not a CSV file in UTF-8 ({error.reason})") from None
-    used = _whole_lines(text) if whole_lines else text
-    columns = columns_of(used, path) if used.strip() else {}
-    if not any(map(len, columns.values())):
-        return _without_positions(header), used == text
-    campaign = parse_table(columns, header, path)
-    return replace(campaign, warnings=tuple(ignored_in(columns, path))), used == text
+    whole = text[: max(text.rfind("\n"), text.rfind("\r")) + 1]
+    campaign = _session(whole, header, path)
+    if whole == text:
+        return campaign
+    try:
+        campaign = _session(text, header, path)
+        odd = "does not end; check that it is whole"
+    except InputError:
+        odd = "is not whole; it is not counted"
+    warning = f"{folder}: the last line of the table {odd}"
+    return replace(campaign, warnings=(*campaign.warnings, warning))
 
 
-def _whole_lines(text: str) -> str:
-    return text[: max(text.rfind("\n"), text.rfind("\r")) + 1]
-
-
-def _without_positions(header: Header) -> Campaign:
+def _session(text: str, header: Header, path: Path) -> Campaign:
+    """The session of a table; it may have no positions."""
+    columns = columns_of(text, path) if text.strip() else {}
+    if any(map(len, columns.values())):
+        campaign = parse_table(columns, header, path)
+        return replace(campaign, warnings=tuple(ignored_in(columns, path)))
     values = {"positions": np.zeros(0, dtype=np.int64), "forces": np.zeros((0, 3))}
     if (header.robot or header.reference) is not None:
         values["angles"] = np.zeros((0, 2))

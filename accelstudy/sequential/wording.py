@@ -39,7 +39,6 @@ def advice_lines(advice: Advice) -> list[str]:
         "lines",
         advice,
         _by_effect(advice.undetermined, model),
-        _by_effect(advice.vague, model),
         attitude(advice.next, FRD if campaign.log is None else campaign.log.axes),
         LEAST_REDUNDANCY,
     )

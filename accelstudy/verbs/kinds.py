@@ -126,10 +126,18 @@ def kind_of_types(expected: str, *types: type, name: str = "text") -> Kind:
 
 
 def _share(name: str, value: Any) -> float | None:
-    from accelstudy.planning.question import confidence_of
-
     check_type(name, value, int, float, str, expected="a probability, as 0.95 or 95%")
-    return confidence_of(str(value).strip())
+    text = str(value).strip()
+    try:
+        share = float(text.removesuffix("%")) / (100 if text.endswith("%") else 1)
+    except ValueError:
+        share = math.nan
+    if text != "rms" and not 0.5 <= share <= 0.999:
+        raise InputError(
+            f"{key('confidence')}: must be rms, or a share from 50% to 99.9% of the calibrations, "
+            f"not {text!r}"
+        )
+    return None if text == "rms" else share
 
 
 def numbers(example: str, separator: str = ",", count: int = 0) -> Kind:

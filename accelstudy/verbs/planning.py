@@ -36,7 +36,6 @@ def plan(
     equipment: str = "both",
     confidence: Annotated[float | str, kinds.SHARE_OR_RMS] = "rms",
     holds: Hold | Sequence[Hold] = (),
-    schemes: kinds.SchemeName | Sequence[kinds.SchemeName] = (),
     max_time: Annotated[Quantity, QUANTITIES["max_time"]] | None = None,
     max_positions: Annotated[int, Range(*MOST_POSITIONS)] = 200,
     replicates: Annotated[int, Range(*REPLICATES)] = 200,
@@ -72,8 +71,6 @@ def plan(
         What must reach the accuracy: the rms, or both angles in so many calibrations, as 95%.
     holds : float in s, or str with a unit, or several
         Duration of a position, as 10s; may be repeated. [default: 1 s to 120 s; 10 s for `sigma`]
-    schemes : str, or several
-        One more to compare: a name, or a file of `accelstudy design`; may be repeated.
     max_time : float in s, or str with a unit
         Longest time in the field, as 20min.
     max_positions : int
@@ -116,16 +113,13 @@ def find_positions(
     criterion: str = "I",
     tilt_range: Annotated[Quantity, angle(GON / 10, 100 * GON)] = "50gon",
     neglect: str | Sequence[str] = (),
-    discriminate: tuple[kinds.EffectName, kinds.EffectName] | None = None,
-    prior: str | Sequence[str] = (),
     after: kinds.SchemeName | None = None,
     attitudes: Annotated[
-        str, Names("attitudes", "accelstudy.proposal.request", "SPACES", True)
+        str, Names("attitudes", "accelstudy.design.spaces", "SPACES", True)
     ] = "all",
     roll: tuple[HalfTurn, HalfTurn] | None = None,
     pitch: tuple[QuarterTurn, QuarterTurn] | None = None,
     pole_distance: Annotated[Quantity, angle(0.0, 100 * GON)] | None = None,
-    least_angle: Annotated[Quantity, angle(0.0, 200 * GON)] | None = None,
     seed: kinds.Seed = 1,
     starts: Annotated[int, Range(1, 1000)] = 8,
 ) -> Design:
@@ -153,23 +147,17 @@ def find_positions(
     neglect : str, or several
         An effect that the model leaves out, though the tilt is to be good, as EFFECT or
         EFFECT=SIZE. SIZE is the sd of its parameters, by default that of cheap equipment.
-    discriminate : two of str
-        Two effects that are to be told from each other; then the tilt does not count.
-    prior : str, or several
-        Sd of what is known of an effect or a parameter before, as bias=20mg or s_x=500ppm.
     after : str
         Scheme that has been measured already.
     attitudes : str
         Those to choose from: all; cube: on faces, edges and corners; hand: in steps of 30° that an
-        eye can judge; or a CSV file of those that are allowed.
+        eye can judge; or a scheme, as a file of those that are allowed.
     roll : two of float in rad, or str with a unit
         Least and largest roll.
     pitch : two of float in rad, or str with a unit
         Least and largest pitch.
     pole_distance : float in rad, or str with a unit
         Least angle to the vertical x axis, where roll is undefined.
-    least_angle : float in rad, or str with a unit
-        Least angle between any two positions.
     starts : int
         Number of random sets from which the search starts.
 
@@ -180,12 +168,11 @@ def find_positions(
 
     Examples
     --------
-        accelstudy design --positions 12 --tilt-range 30gon --least-angle 20gon --out
-            my-scheme.yaml
+        accelstudy design --positions 12 --tilt-range 30gon --out my-scheme.yaml
         accelstudy simulate-campaign --scheme my-scheme.yaml --out designed-campaign
     """
     given = {**locals()}
-    from accelstudy.proposal.design import Design
+    from accelstudy.planning.design import Design
 
     return Design.of(**given)
 
@@ -227,7 +214,7 @@ def advise(
         An earlier calibration.json with the same model, or the type.yaml of a lot.
     attitudes : str
         Attitudes to choose from: cube (faces, edges, corners), grid (roll and pitch in steps of 25
-        gon) or a CSV file. [default: cube, with a robot grid]
+        gon) or a scheme. [default: cube, with a robot grid]
     pole_distance : float in rad, or str with a unit
         Least angle between the x axis and the vertical. [default: none]
     max_roll : float in rad, or str with a unit

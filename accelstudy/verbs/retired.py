@@ -20,12 +20,16 @@ KEYWORDS = {
         "sensor": "`columns` takes those of one sensor; import each into a folder of its own",
     },
     "find_positions": {
-        "mountings": "`attitudes` takes a CSV file of the attitudes that a mount allows"
+        "discriminate": "the report of a diagnosis has the positions that tell its rivals apart",
+        "least_angle": "a repeated position tells as much as one apart; leave it out",
+        "prior": "`after` takes a scheme that was measured; a prior is for `advise`",
+        "mountings": "`attitudes` takes a scheme, as a file of the attitudes that a mount allows",
     },
     "init": {"sensor": "set `noise` and `sensor` in config/config.yaml of the new folder"},
     "plan": {
         "reference": "`accelstudy import --reference-log` takes a calibrated sensor",
         "robot_accuracy": "`robot_sigma` takes it",
+        "schemes": "`accelstudy simulate --scheme` says what a scheme of yours leaves",
     },
     "simulate": {"robot_accuracy": "`robot_sigma` takes it"},
     "simulate_campaign": {

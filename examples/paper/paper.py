@@ -10,7 +10,7 @@ import numpy as np
 from accelstudy.adjustment import calibrate
 from accelstudy.approaches import get_approach
 from accelstudy.basics.units import GON, MGON
-from accelstudy.leveling.error import cap_forces, leveling_error
+from accelstudy.leveling.error import cap_forces, tilt_error
 from accelstudy.schemes import get_scheme
 from accelstudy.sensors.models import get_model
 from accelstudy.simulation.sessions import Noise, session
@@ -31,8 +31,9 @@ results, tilt = {}, {}
 for name in ("gravity", "robot"):
     observed = simulated.draw(noise, sessions, np.random.default_rng(2018))
     results[name] = calibrate(model, get_approach(name), observed)
-    attitudes = cap_forces(50 * GON, 200)
-    tilt[name] = leveling_error(model, truth, model, results[name].parameters, attitudes).rms
+    estimates, attitudes = results[name].parameters, cap_forces(50 * GON, 200)
+    error = tilt_error(model, truth, model, estimates.mean(axis=0), attitudes)
+    tilt[name] = np.sqrt(np.mean(error.squares(estimates), axis=0))
 # --8<-- [end:run]
 
 # --8<-- [start:table]

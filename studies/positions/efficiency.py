@@ -13,7 +13,7 @@ from matplotlib.figure import Figure
 from accelstudy.approaches import get_approach
 from accelstudy.basics.units import display_unit, to_display
 from accelstudy.design.continuous import continuous_optimum
-from accelstudy.design.criteria import get_criterion
+from accelstudy.design.criteria import get_criterion, rms_tilt
 from accelstudy.design.search import Search
 from accelstudy.design.spaces import Attitudes
 from accelstudy.design.task import Task
@@ -59,7 +59,7 @@ def efficiency_table(
         }
         shown = {scheme.title: scheme.directions for scheme in schemes}
         for n in positions:
-            best = Search(task, criteria["I"], n, seed=SEED).optimum(bounded=False)
+            best = Search(task, criteria["I"], seed=SEED).optimum(n, bounded=False)
             shown[f"{n} I-optimal"] = best.directions
         for i, (title, directions) in enumerate(shown.items()):
             n, reason = len(directions), task.missing(directions)
@@ -68,7 +68,7 @@ def efficiency_table(
                 "n": n, "reason": reason, "least_rms": np.exp(bounds["I"] / 2) / np.sqrt(n),
             }  # fmt: skip
             if not reason:
-                row["rms"] = np.sqrt(np.mean(task.rms_tilt(directions) ** 2))
+                row["rms"] = np.sqrt(np.mean(rms_tilt(task, directions) ** 2))
                 information = task.normal(directions) / n
                 for name, c in criteria.items():
                     row[name] = min(1.0, c.efficiency(float(c.value(information)), bounds[name]))

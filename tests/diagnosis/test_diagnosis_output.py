@@ -11,6 +11,7 @@ import pandas as pd
 import pytest
 import yaml
 from diagnosis_helpers import SCHEMA, explanation, otherwise
+from leveling_helpers import leveling_error
 from page_helpers import assert_sound, text_of
 from places import ROOT
 from stand_ins import composed
@@ -32,7 +33,7 @@ from accelstudy.diagnosis.report.output import Diagnosis
 from accelstudy.diagnosis.report.words import render, verdict_lines, warnings
 from accelstudy.diagnosis.rules import RULES
 from accelstudy.diagnosis.space.examined import examine
-from accelstudy.leveling.error import cap_forces, holds_in_use, leveling_error
+from accelstudy.leveling.error import cap_forces, holds_in_use
 from accelstudy.simulation.sessions import Noise, session
 from accelstudy.study.config import read_study
 

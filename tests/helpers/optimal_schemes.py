@@ -20,10 +20,10 @@ DECIMALS = 6
 def searched(name, n):
     """Positions that are found, their efficiency, and the bound of the criterion."""
     criterion = get_criterion(name, TASK)
-    found = Search(TASK, criterion, n).optimum()
+    found = Search(TASK, criterion).optimum(n)
     directions = (found.directions.round(DECIMALS) + 0.0).tolist()
     value = float(criterion.value(TASK.normal(directions)))
-    efficiency = min(1.0, criterion.efficiency(value, found.bound))
+    efficiency = criterion.efficiency(value, found.bound)
     return {
         "efficiency": round(efficiency, 5),
         "bound": round(found.bound, 5),

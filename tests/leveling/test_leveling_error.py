@@ -2,11 +2,12 @@
 
 import numpy as np
 import pytest
+from leveling_helpers import leveling_error
 from usual import NINE, PAPER, PAPER_TRUTH, G
 
 from accelstudy.basics.units import GON, MGON
 from accelstudy.leveling.angles import roll_pitch
-from accelstudy.leveling.error import ATTITUDES, cap_forces, leveling_error, tilt_error
+from accelstudy.leveling.error import ATTITUDES, cap_forces, tilt_error
 from accelstudy.sensors.models import compose
 
 # What the gravity-based calibration of 24 positions leaves.

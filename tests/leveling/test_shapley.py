@@ -10,8 +10,12 @@ from accelstudy.basics.units import GON
 from accelstudy.design.estimability import estimability
 from accelstudy.leveling.angles import specific_force
 from accelstudy.leveling.sensitivity import leveling_function, leveling_sensitivity
-from accelstudy.leveling.shapley import linear_shapley
-from accelstudy.leveling.shares import leveling_shares, leveling_slope, order_changes
+from accelstudy.leveling.shares import (
+    leveling_shares,
+    leveling_slope,
+    linear_shapley,
+    order_changes,
+)
 from accelstudy.schemes import get_scheme
 from accelstudy.simulation.sessions import Noise
 

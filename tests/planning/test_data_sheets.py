@@ -19,7 +19,6 @@ from accelstudy.data_sheets import (
 )
 from accelstudy.data_sheets.measured import with_history
 from accelstudy.data_sheets.sheet import FLICKER, flicker_change
-from accelstudy.planning.question import get_sensor
 
 
 @pytest.mark.parametrize("name", data_sheet_names())
@@ -168,7 +167,7 @@ def test_a_campaign_tells_the_noise_of_its_positions(still_log, tmp_path):
     succeed("data-sheet", tmp_path / "c", "--out", tmp_path / "mine.yaml")
     sheet = get_data_sheet(str(tmp_path / "mine.yaml"))
     assert sheet.position_sigma is not None
-    assert get_sensor(str(tmp_path / "c")).position_sigma == pytest.approx(
+    assert get_data_sheet(str(tmp_path / "c")).position_sigma == pytest.approx(
         sheet.position_sigma, rel=1e-3
     )
 
@@ -183,7 +182,7 @@ def test_a_log_that_is_too_short_ends_with_one_line(rows, message, tmp_path):
 
 def test_a_log_is_no_sensor_and_says_how_to_make_one(still_log):
     with pytest.raises(InputError, match=r"accelstudy data-sheet .*still\.csv --out still\.yaml"):
-        get_sensor(str(still_log))
+        get_data_sheet(str(still_log))
 
 
 def history(path, scatter, rate, name="b_%s"):

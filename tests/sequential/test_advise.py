@@ -3,6 +3,7 @@
 import re
 import shutil
 import subprocess
+from itertools import product
 
 import numpy as np
 import pytest
@@ -17,7 +18,9 @@ from accelstudy.basics.units import GON, MGON
 from accelstudy.campaign.calibration.assessment import assess
 from accelstudy.campaign.calibration.fit import fit_campaign
 from accelstudy.campaign.format import read_campaign
+from accelstudy.campaign.session import Campaign
 from accelstudy.leveling.angles import specific_force
+from accelstudy.schemes import get_scheme
 from accelstudy.sensors.frames import parse_frame
 from accelstudy.sensors.models import get_model
 from accelstudy.sequential.advisor import advise as advice_for
@@ -25,6 +28,7 @@ from accelstudy.sequential.choice import candidate_positions
 from accelstudy.sequential.promise import Promise
 from accelstudy.sequential.running import read_running
 from accelstudy.sequential.wording import attitude
+from accelstudy.simulation.sessions import Noise, session
 
 MODEL = "bias-scale-nonorthogonality"
 WANTED = ("--tilt-accuracy", "10mgon", "--tilt-range", "30gon")
@@ -122,8 +126,9 @@ def test_the_next_position_is_worth_more_than_others(begun):
 
 def test_limits_of_the_attitudes(begun, tmp_path):
     folder = begun(9, "robot")
-    (tmp_path / "mine.csv").write_text("roll_gon,pitch_gon\n12.5,7.5\n", encoding="utf-8")
-    text = advise(folder, "--attitudes", tmp_path / "mine.csv")
+    down = [-x for x in specific_force(12.5 * GON, 7.5 * GON, 1.0)]
+    (tmp_path / "mine.yaml").write_text(yaml.safe_dump({"directions": [[*map(float, down)]]}))
+    text = advise(folder, "--attitudes", tmp_path / "mine.yaml")
     assert "position: roll 12.5 gon, pitch 7.5 gon" in text
     text = advise(folder, "--max-roll", "40gon", "--max-pitch", "30gon", "--pole-distance", "50gon")
     roll, pitch = map(float, re.search(r"position: roll (\S+) gon, pitch (\S+) gon", text).groups())
@@ -198,6 +203,36 @@ def test_it_judges_as_the_calibration_does(begun, n, bumped):
     suspects = [int(measured.positions[s.position]) for s in calibrated.suspects]
     assert list(advice.suspects) == sorted(suspects)
     assert advice.enough == (not bumped)
+
+
+def test_it_never_says_enough_where_the_calibration_is_rejected():
+    """Sessions of sensors with effects that the model lacks, and of a noise that is wrongly stated.
+
+    The calibration is that of `calibrate`, and most of these sessions come to be rejected.
+    """
+    model, by = get_model(MODEL), get_approach("gravity")
+    promise, directions = Promise(20 * MGON, 30 * GON), candidate_positions("cube")
+    seen = []
+    for seed, (effect, size, sigma) in enumerate(product(
+        (None, "quadratic_scale", "cubic_scale"), (3e-4, 2e-3), (0.5e-3, 2e-3, 6e-3)
+    )):  # fmt: skip
+        sensor = get_model(MODEL + (f"+{effect}" if effect else ""))
+        truth = np.zeros(sensor.n_parameters)
+        truth[9:] = size
+        order = np.random.default_rng(seed).permutation(26)
+        whole = session(sensor, truth, get_scheme("faces-edges-corners-26").directions[order])
+        drawn = whole.draw(Noise(0.002), 1, np.random.default_rng(seed))
+        for n in (14, 26):
+            forces = drawn.forces[0, :n]
+            campaign = Campaign("s", np.arange(1, n + 1), forces, 9.80665, sigma_force=sigma)
+            advice = advice_for(campaign, model, by, promise, directions)
+            state = assess(fit_campaign(campaign, model, by)).state
+            assert advice.calibration_state == state
+            assert not (advice.enough and state in ("rejected", "implausible"))
+            seen.append((state == "rejected", advice.enough))
+    rejected, enough = np.mean(seen, axis=0)
+    assert 0.3 < rejected < 0.9
+    assert enough > 0.1
 
 
 def test_a_repeat_that_disagrees_too_was_not_bumped(begun):

@@ -89,13 +89,14 @@ def test_attitudes_to_choose_from(tmp_path):
     assert np.all(np.arccos(np.abs(far[:, 0])) >= 60 * GON - 1e-6)
     low = candidate_positions("grid", max_roll=50 * GON, max_pitch=50 * GON)
     assert np.all(low[:, 2] > 0.4)
-    (tmp_path / "mine.csv").write_text("roll_gon,pitch_gon\n0,0\n50,0\n", encoding="utf-8")
-    assert len(candidate_positions(str(tmp_path / "mine.csv"))) == 2
+    mine = tmp_path / "mine.yaml"
+    mine.write_text("directions: [[0, 0, 1], [0, 1, 1]]", encoding="utf-8")
+    assert len(candidate_positions(str(mine))) == 2
     with pytest.raises(UnknownNameError, match="set of attitudes 'cubes'; did you mean 'cube'"):
         candidate_positions("cubes")
-    (tmp_path / "mine.csv").write_text("roll_gon,pitch_gon\n50,0\n", encoding="utf-8")
-    with pytest.raises(InputError, match=r"none of .*mine\.csv is within"):
-        candidate_positions(str(tmp_path / "mine.csv"), max_roll=20 * GON)
+    mine.write_text("directions: [[0, 1, 1]]", encoding="utf-8")
+    with pytest.raises(InputError, match=r"none of .*mine\.yaml is within"):
+        candidate_positions(str(mine), max_roll=20 * GON)
 
 
 # --- the rule of stopping ------------------------------------------------------------------------

@@ -5,12 +5,13 @@ import math
 import numpy as np
 import pytest
 from calling import refused
+from leveling_helpers import leveling_error
 from scipy import stats
 from study_helpers import NINE, grid, make_cells, make_study, simulated
 
 from accelstudy.basics.units import MGON, STANDARD_GRAVITY
 from accelstudy.effects import get_effect
-from accelstudy.leveling.error import cap_forces, leveling_error
+from accelstudy.leveling.error import cap_forces
 from accelstudy.sensors.sensor import SensorModel
 from accelstudy.simulation.hold_plan import HoldPlan
 

@@ -2,16 +2,11 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 import numpy as np
 from numpy.typing import NDArray
 
-from accelstudy.design.information import position_rows
 from accelstudy.design.task import Task
 from accelstudy.positions.choice import first_best
-from accelstudy.sensors.models import compose
-from accelstudy.simulation.hold_plan import HoldPlan
 
 Array = NDArray[np.float64]
 Order = NDArray[np.int_]
@@ -78,16 +73,13 @@ def _drift_shown(task: Task, directions: Array) -> Array:
 
     directions : (k, n, 3) array, of k orders. Returns (k,).
     """
-    effects = [effect.spec for effect in task.model.effects]
-    model = compose("drifting", (*effects, "bias_drift"))
-    (k, n), u = directions.shape[:2], task.model.n_parameters
-    hold = HoldPlan().hold(n).take(np.tile(np.arange(n), k))
-    hold = replace(hold, time=np.tile(np.linspace(-1.0, 1.0, n), k))
-    fixed_gravity = replace(task.noise, sigma_gravity=0.0)
-    flat = directions.reshape(-1, 3)
-    rows = position_rows(model, task.approach, fixed_gravity, flat, task.gravity, hold)
-    rows = rows.reshape(k, -1, rows.shape[-1])
-    rows = rows / np.linalg.norm(rows, axis=1, keepdims=True)
+    (k, n), u = directions.shape[:2], np.count_nonzero(task.estimated)
+    rows = task.rows(directions.reshape(-1, 3))[..., task.estimated].reshape(k, n, -1, u)
+    effects = [effect.name for effect in task.model.effects for _ in effect.parameters]
+    biases = np.flatnonzero(np.array(effects) == "bias")
+    drifts = np.linspace(-1.0, 1.0, n)[:, None, None] * rows[..., biases]
+    whole = np.concatenate([rows, drifts], axis=-1).reshape(k, -1, u + len(biases))
+    whole = whole / np.linalg.norm(whole, axis=1, keepdims=True)
     # The last block of R is what orthogonalisation to the parameters leaves of the drift.
-    left = np.linalg.qr(rows).R[:, u:, u:]
-    return np.asarray(np.sum(left**2, axis=1).min(axis=1))
+    left = np.linalg.qr(whole).R[:, u:, u:]
+    return np.asarray(np.sum(left**2, axis=1).min(axis=1, initial=1.0))

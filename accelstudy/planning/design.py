@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
+from dataclasses import replace
 from functools import cached_property
 from os import PathLike
 from pathlib import Path
@@ -15,7 +16,7 @@ import yaml
 from numpy.typing import NDArray
 
 from accelstudy import __version__
-from accelstudy.adjustment.quality import noncentrality
+from accelstudy.approaches import get_approach
 from accelstudy.basics import bounds
 from accelstudy.basics.arguments import path_of, tidy
 from accelstudy.basics.errors import InputError, key
@@ -28,19 +29,23 @@ from accelstudy.basics.units import (
     angles_in,
     attitude_unit,
     display_unit,
+    parse_quantity,
     to_attitude,
     to_display,
     to_recorded,
 )
-from accelstudy.basics.wording import amount
-from accelstudy.design.search import round_directions
-from accelstudy.design.spaces import angles_to
+from accelstudy.design.criteria import get_criterion, rms_tilt
+from accelstudy.design.order import field_order
+from accelstudy.design.search import Search, round_directions
+from accelstudy.design.spaces import SPACES, angles_to, find_attitudes
+from accelstudy.design.task import Task
 from accelstudy.drawing.style import FULL
+from accelstudy.effects import get_effect
 from accelstudy.files.outputs import new_file
 from accelstudy.pages.result import Result
-from accelstudy.proposal.order import field_order
-from accelstudy.proposal.request import Request
 from accelstudy.schemes import get_scheme, is_scheme_file
+from accelstudy.sensors.models import get_model
+from accelstudy.sensors.sensor import SensorModel
 from accelstudy.simulation.sessions import Noise
 
 if TYPE_CHECKING:
@@ -56,31 +61,30 @@ class Design(Result):
 
     Attributes
     ----------
-    request : Request
+    search : accelstudy.design.search.Search
     directions : (n, 3) array of unit vectors, in the order of measurement, as in the file
     efficiency : float, least share of the best that as many positions can reach; NaN if unknown
+    asked : mapping, texts and numbers that were given: attitudes, after, neglect, starts
     """
 
     size = FULL, 80.0
 
-    def __init__(self, request: Request, directions: Array, efficiency: float) -> None:
-        self.request, self.directions, self.efficiency = request, directions, efficiency
-        self.name = f"{len(directions)} positions"
+    def __init__(
+        self, search: Search, directions: Array, efficiency: float, asked: Mapping[str, Any]
+    ) -> None:
+        self.search, self.directions, self.efficiency = search, directions, efficiency
+        self.asked, self.name = asked, f"{len(directions)} positions"
 
     @classmethod
-    def of(cls, *, sigma: float, robot_sigma: float, gravity_sigma: float, **given: Any) -> Design:
-        """Search by the keywords of `accelstudy.find_positions`, checked, and order what is found.
-
-        Errors are those of `Search.optimum`.
-        """
-        bounds.SIGMA_FORCE.check_key(key("sigma"), sigma)
-        bounds.SIGMA_ANGLE.check_key(key("robot_sigma"), robot_sigma / MGON)
-        bounds.SIGMA_GRAVITY.check_key(key("gravity_sigma"), gravity_sigma)
-        request = Request(noise=Noise(sigma, robot_sigma, gravity_sigma), **given)
+    def of(cls, *, positions: int, starts: int, **given: Any) -> Design:
+        """Search by the keywords of `accelstudy.find_positions`, and order what is found."""
         with stage("search"):
-            found = request.search.optimum(request.starts)
-            order = field_order(request.task, found.directions)
-            return cls(request, found.directions[order], found.efficiency)
+            search = search_for(**given)
+            found = search.optimum(positions, starts)
+            order = field_order(search.task, found.directions)
+        names = ("attitudes", "after", "neglect")
+        asked = {name: given[name] for name in names} | {"starts": starts}
+        return cls(search, found.directions[order], found.efficiency, asked)
 
     @property
     def state(self) -> str:
@@ -99,53 +103,33 @@ class Design(Result):
         found = {"design": self.provenance, "positions": positions}
         return {"state": self.state, "verdict": self.verdict, **found}
 
-    @property
-    def turns(self) -> Array:
-        """Angle from the position before, rad, (n,); NaN for the first."""
-        cosines = np.sum(self.directions[1:] * self.directions[:-1], axis=1)
-        return np.array([np.nan, *np.arccos(np.clip(cosines, -1, 1))])
-
     @cached_property
     def rms(self) -> Array:
         """Expected rms of roll and of pitch, rad, (2,)."""
-        return self.request.task.rms_tilt(self.directions)
-
-    def nameable(self, directions: Array) -> dict[str, tuple[float, str]]:
-        """Size from which each parameter of two rivals can be told from the other effect, SI."""
-        criterion, task = self.request.chosen, self.request.task
-        if not self.request.discriminate:
-            return {}
-        size = np.sqrt(noncentrality(1) * criterion.squares(task.normal(directions)))
-        places = np.concatenate([task.places(effect) for effect in task.neglected])
-        units = {p.name: p.unit for p in task.extended.parameters}
-        return {
-            task.names[i]: (float(one / task.scale[i]), units[task.names[i]])
-            for i, one in zip(places, size, strict=True)
-        }
+        return rms_tilt(self.search.task, self.directions)
 
     @property
     def provenance(self) -> dict[str, Any]:
         """How it was made and how good it is, as plain data in the units of files."""
-        request, noise = self.request, self.request.noise
+        search, asked = self.search, self.asked
+        task, noise = search.task, search.task.noise
         with angles_in("gon"):
-            constraints = request.allowed.constraints
+            constraints = search.allowed.constraints
         content = {
             "version": __version__,
-            "criterion": f"{request.chosen.name}: {request.chosen.text}",
-            "model": request.task.model.name,
-            "approach": request.approach,
-            "tilt_range_gon": tidy(request.tilt_range / GON, 6),
+            "criterion": f"{search.criterion.name}: {search.criterion.text}",
+            "model": task.model.name,
+            "approach": task.approach.name,
+            "tilt_range_gon": tidy(task.tilt_range / GON, 6),
             "sigma_mps2": tidy(noise.sigma_force, 6),
             "robot_sigma_mgon": tidy(noise.sigma_angle / MGON, 6),
             "gravity_sigma_mps2": tidy(noise.sigma_gravity, 6),
-            "attitudes": request.allowed.text,
+            "attitudes": search.allowed.text,
             "constraints": constraints,
-            "prior": list(request.prior),
-            "after": None if request.after is None else get_scheme(request.after).name,
-            "neglected": list(request.neglect),
-            "discriminate": list(request.discriminate or ()),
-            "seed": request.seed,
-            "starts": request.starts,
+            "after": get_scheme(asked["after"]).name if asked["after"] else None,
+            "neglected": list(asked["neglect"]),
+            "seed": search.seed,
+            "starts": asked["starts"],
             "efficiency": tidy(self.efficiency, 6),
             "rms_roll_mgon": tidy(self.rms[0] / MGON, 6),
             "rms_pitch_mgon": tidy(self.rms[1] / MGON, 6),
@@ -154,14 +138,14 @@ class Design(Result):
 
     def to_frame(self) -> pd.DataFrame:
         """Return the positions, with angles in the unit that the names say."""
-        unit = attitude_unit()
+        unit, cosines = attitude_unit(), np.sum(self.directions[1:] * self.directions[:-1], axis=1)
         roll, pitch = to_attitude(angles_to(self.directions)).T
         return pd.DataFrame(
             {
                 "position": range(1, len(roll) + 1),
                 f"roll/{unit}": roll.round(2) + 0.0,
                 f"pitch/{unit}": pitch.round(2) + 0.0,
-                f"turn/{unit}": to_attitude(self.turns),
+                f"turn/{unit}": to_attitude([np.nan, *np.arccos(np.clip(cosines, -1, 1))]),
             }
         )
 
@@ -188,38 +172,29 @@ class Design(Result):
     def tell(self, place: Path) -> None:
         """Print the positions and what they bring."""
         show(self.table())
-        say("\n".join(self.lines()))
-        say(f"scheme: {place}")
+        say("\n".join([*self.lines(), f"scheme: {place}"]))
 
     def lines(self) -> Iterable[str]:
         """What the design brings, in sentences."""
-        request, unit = self.request, display_unit("rad")
-        noise, reference = request.noise, get_scheme(REFERENCE)
-        given = f"noise {to_display(noise.sigma_force, 'm/s^2'):.3g} mm/s² per position"
-        if request.task.approach.uses_angles:
-            given += f" and robot noise {to_display(noise.sigma_angle, 'rad'):.3g} {unit}"
-        tilt = f"{to_attitude(request.tilt_range):.4g} {attitude_unit()}"
-        effects = ", the neglected effects included" if request.neglect else ""
-        after = f" after {request.after}" if request.after else ""
-        yield (
-            "\nturn: angle from the position before; 0 repeats it."
-            f"\nExpected rms of leveling for tilts up to {tilt}, with {given}{effects}:"
-        )
-        yield f"  these {self.name}{after}: {_both(self.rms)}"
-        rms = request.task.rms_tilt(reference.directions)
+        task, reference = self.search.task, get_scheme(REFERENCE)
+        noise = f"noise {to_display(task.noise.sigma_force, 'm/s^2'):.3g} mm/s² per position"
+        if task.approach.uses_angles:
+            robot = to_display(task.noise.sigma_angle, "rad")
+            noise += f" and robot noise {robot:.3g} {display_unit('rad')}"
+        tilt = f"{to_attitude(task.tilt_range):.4g} {attitude_unit()}"
+        effects = ", the neglected effects included" if task.neglected else ""
+        after = f" after {self.asked['after']}" if self.asked["after"] else ""
+        rms = rms_tilt(task, reference.directions)
         theirs = _both(rms) if np.isfinite(rms).all() else "do not determine the model"
+        yield "\nturn: angle from the position before; 0 repeats it."
+        yield f"Expected rms of leveling for tilts up to {tilt}, with {noise}{effects}:"
+        yield f"  these {self.name}{after}: {_both(self.rms)}"
         yield f"  the {reference.n_positions} of {REFERENCE}{after}: {theirs}"
-        if sizes := self.nameable(self.directions):
-            there = self.nameable(reference.directions)
-            yield "Size from which a parameter is found, and told from the other effect:"
-            for name, (size, of) in sizes.items():
-                here, other = (amount(s, of) for s in (size, there[name][0]))
-                yield f"  {name}: {here} {display_unit(of)} ({REFERENCE}: {other})"
-        share = 100 * self.efficiency
-        if share == share:
+        if self.efficiency == self.efficiency:
             yield (
-                f"Efficiency at least {share:.1f} % of the best that any {len(self.directions)} "
-                f"allowed positions can reach ({request.chosen.text})."
+                f"Efficiency at least {100 * self.efficiency:.1f} % of the best that any "
+                f"{len(self.directions)} allowed positions can reach "
+                f"({self.search.criterion.text})."
             )
         yield f"Noise of a leveled reading comes on top. {angle_note()}."
 
@@ -231,19 +206,76 @@ class Design(Result):
         path : path, ending in .yaml
         force : bool, whether to replace a file that is there
         """
-        place, asked = path_of("path", path), self.request
-        read = [asked.attitudes] if asked.attitudes.endswith(".csv") else []
-        read += [one for one in (asked.after,) if one and is_scheme_file(one)]
+        place, attitudes, after = (
+            path_of("path", path),
+            self.asked["attitudes"],
+            self.asked["after"],
+        )
+        read = [attitudes] if attitudes.endswith(".csv") else []
+        read += [after] if after and is_scheme_file(after) else []
         with new_scheme(place, read, force) as file:
             self.write(file, place)
 
     def write(self, file: Path, place: Path) -> None:
         """Write a file that becomes `place`, by which the scheme is named."""
-        name = path_name(place.stem, "scheme")
-        kind = self.request.chosen.name
-        kind = f"{kind}-optimal" if len(kind) == 1 else kind
-        title, source = f"{name} ({kind})", f"accelstudy design, seed {self.request.seed}"
-        write_design(file, name, title, source, self.directions, self.provenance)
+        name, kind = path_name(place.stem, "scheme"), self.search.criterion.name
+        title = f"{name} ({kind}-optimal)" if len(kind) == 1 else f"{name} ({kind})"
+        source = f"accelstudy design, seed {self.search.seed}"
+        write_scheme(file, name, title, source, self.directions, self.provenance)
+
+
+def search_for(
+    *,
+    model: str,
+    approach: str,
+    criterion: str,
+    sigma: float,
+    robot_sigma: float,
+    gravity_sigma: float,
+    tilt_range: float,
+    after: str | None,
+    neglect: Sequence[str],
+    attitudes: str,
+    seed: int,
+    **constraints: Any,
+) -> Search:
+    """Search that the keywords of `accelstudy.find_positions` ask for, checked."""
+    bounds.SIGMA_FORCE.check_key(key("sigma"), sigma)
+    bounds.SIGMA_ANGLE.check_key(key("robot_sigma"), robot_sigma / MGON)
+    bounds.SIGMA_GRAVITY.check_key(key("gravity_sigma"), gravity_sigma)
+    known = get_model(model)
+    task = Task(
+        known,
+        get_approach(approach),
+        Noise(sigma, robot_sigma, gravity_sigma),
+        tilt_range,
+        measured=get_scheme(after).directions if after else np.zeros((0, 3)),
+        neglected=_neglected(known, neglect),
+    )
+    allowed = replace(find_attitudes(attitudes, SPACES), **constraints)
+    return Search(task, get_criterion(criterion, task), allowed, seed)
+
+
+def _neglected(model: SensorModel, texts: Sequence[str]) -> dict[str, float]:
+    """Sd, SI, of the parameters of each neglected effect; without one that of cheap equipment."""
+    sizes: dict[str, float] = {}
+    for text in texts:
+        # An effect may have settings of its own, with equal signs.
+        name, equal, size = text.rpartition("=")
+        if not equal or ")" in size:
+            name, size = text, ""
+        effect = get_effect(name.strip())
+        if effect.spec in [one.spec for one in model.effects]:
+            raise InputError(f"the effect {effect.spec!r} is in the model; it is not neglected")
+        sizes[effect.spec] = effect.typical[1]
+        if size:
+            try:
+                sizes[effect.spec] = parse_quantity(size, effect.parameters[0].unit)
+            except InputError as error:
+                raise InputError(f"neglect: {text}: {error}") from None
+        if not sizes[effect.spec] > 0:
+            raise InputError(f"neglect: {text}: must be more than 0")
+    return sizes
 
 
 @contextmanager
@@ -261,13 +293,8 @@ def _both(rms: Any) -> str:
     return f"roll {roll:.2f} {unit}, pitch {pitch:.2f} {unit}"
 
 
-def write_design(
-    path: Path,
-    name: str,
-    title: str,
-    source: str,
-    directions: Array,
-    made: Mapping[str, Any],
+def write_scheme(
+    path: Path, name: str, title: str, source: str, directions: Array, made: Mapping[str, Any]
 ) -> None:
     """Write a scheme that `accelstudy.schemes.get_scheme` reads.
 
@@ -278,17 +305,16 @@ def write_design(
     directions : (n, 3) array of unit vectors
     made : mapping, plain data: how it was made, and how good it is
     """
-    roll, pitch = (to_recorded(angles_to(directions), "rad") / 1000).T
-    positions = [
-        {"position": i + 1, "roll_gon": _gon(roll[i]), "pitch_gon": _gon(pitch[i])}
-        for i in range(len(directions))
-    ]
+    angles = (to_recorded(angles_to(directions), "rad") / 1000).round(3) + 0.0
     content = {
         "scheme": name,
         "title": title,
         "source": source,
         "design": dict(made),
-        "positions": positions,
+        "positions": [
+            {"position": i, "roll_gon": roll, "pitch_gon": pitch}
+            for i, (roll, pitch) in enumerate(angles.tolist(), 1)
+        ],
         "directions": round_directions(directions).tolist(),
     }
     head = (
@@ -300,7 +326,3 @@ def write_design(
         content, sort_keys=False, allow_unicode=True, default_flow_style=None, width=100
     )
     path.write_text(head + text, encoding="utf-8")
-
-
-def _gon(angle: float) -> float:
-    return round(float(angle), 3) + 0.0

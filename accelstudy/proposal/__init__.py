@@ -1,1 +1,0 @@
-"""A proposed design: from a request to ordered positions, a file and a figure."""
