@@ -2,13 +2,18 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import replace
+from typing import Any
 
-from accelstudy.basics.progress import track
+from accelstudy.basics.errors import InputError, UnknownNameError
+from accelstudy.basics.progress import begin, track
+from accelstudy.data_sheets import get_data_sheet, sheet_of_sigma
 from accelstudy.planning.candidates import Candidate, candidates, sort_by_time
 from accelstudy.planning.fewest import CalibrationKind, cheapest
-from accelstudy.planning.question import Question
+from accelstudy.planning.plan import Plan, most_accurate
+from accelstudy.planning.question import Equipment, Question
 from accelstudy.planning.simulated import simulate_candidates, study_of
 
 MAX_RANKED = 5
@@ -20,48 +25,43 @@ MAX_TRIES = 12
 """Candidates of one kind that are simulated until one reaches the target."""
 
 
-@dataclass(frozen=True)
-class Answer:
-    """The result of a plan.
+def plan_for(**given: Any) -> Plan:
+    """Plan by the keywords of `accelstudy.plan`, checked."""
+    sensor, sigma, max_time = given["sensor"], given["sigma"], given["max_time"]
+    by_hand = Equipment("gravity", given["moving_time"], 0.0)
+    robot = Equipment("robot", given["robot_moving_time"], given["robot_setup_time"])
+    equipment = {"gravity": (by_hand,), "robot": (robot,), "both": (by_hand, robot)}
+    if given["equipment"] not in equipment:
+        raise UnknownNameError("equipment", given["equipment"], equipment)
+    if (sensor is None) == (sigma is None):
+        both = ", not both" if sensor else ""
+        raise InputError(f"plan: give the sensor by `sensor`, or its noise by `sigma`{both}")
+    sheet = get_data_sheet(sensor) if sigma is None else sheet_of_sigma(sigma)
+    if given["history"] is not None:
+        from accelstudy.data_sheets.measured import with_history  # slow to import
 
-    Attributes
-    ----------
-    question : Question
-    seed, replicates : int, of the simulation
-    compared : list of Candidate, all that were compared
-    ranked : list of Candidate, the cheapest of an equipment and a model each that reach the target,
-        simulated, by the time they take; empty if none does
-    """
-
-    question: Question
-    seed: int
-    replicates: int
-    compared: list[Candidate]
-    ranked: list[Candidate] = field(default_factory=list)
-
-    @property
-    def first(self) -> Candidate:
-        """The recommended candidate: by hand if that reaches the target, else with the robot."""
-        return min(self.ranked, key=lambda c: c.equipment.name != "gravity")
-
-    def best(self, equipment: str = "") -> Candidate | None:
-        """The most accurate candidate, of all or with one equipment, however long it takes."""
-        chosen = [c for c in self.compared if equipment in ("", c.equipment.name)]
-        return _most_accurate(self.question, chosen)
-
-    @property
-    def study(self) -> dict[str, object]:
-        """Configuration of the study whose cells are the simulated candidates."""
-        chosen = sorted(self.ranked, key=lambda c: c is not self.first)
-        return study_of(self.question, chosen, self.seed, self.replicates)
+        sheet = with_history(sheet, given["history"])
+    asked = Question(
+        given["tilt_accuracy"],
+        given["tilt_range"],
+        sheet,
+        equipment[given["equipment"]],
+        given["confidence"],
+        tuple(sorted({*given["holds"]})),
+        given["robot_sigma"],
+        math.inf if max_time is None else max_time,
+        given["max_positions"],
+    )
+    begin("comparing calibrations, which takes some seconds ...")
+    return answer(asked, given["seed"], given["replicates"])
 
 
-def answer(question: Question, seed: int = 1, replicates: int = 200) -> Answer:
+def answer(question: Question, seed: int = 1, replicates: int = 200) -> Plan:
     """Compare all calibrations, rank those that reach the target, and simulate the first."""
     compared = _with_most_positions(question, candidates(question))
-    plan = Answer(question, seed, replicates, compared)
+    plan = Plan(question, seed, replicates, compared)
     kinds: dict[tuple[str, str], list[Candidate]] = {}
-    for c in plan.compared:
+    for c in compared:
         kinds.setdefault((c.equipment.name, c.model.name), []).append(c)
     quickest = sort_by_time(filter(None, (cheapest(question, kind) for kind in kinds.values())))
     # The first of each equipment comes before all others.
@@ -72,13 +72,9 @@ def answer(question: Question, seed: int = 1, replicates: int = 200) -> Answer:
         new = candidate.equipment not in [c.equipment for c in ranked]
         confirmed = _confirm(plan, candidate, new) if new or len(ranked) < MAX_RANKED else None
         ranked += [confirmed] if confirmed else []
-    known = [next((r for r in ranked if r == c), c) for c in plan.compared]
+    known = [next((r for r in ranked if r == c), c) for c in compared]
     known += [r for r in ranked if r not in known]
-    return replace(plan, compared=known, ranked=sort_by_time(ranked))
-
-
-def _most_accurate(question: Question, chosen: Sequence[Candidate]) -> Candidate | None:
-    return min(chosen, key=lambda c: question.accuracy(c.tilt), default=None)
+    return replace(plan, candidates=known, ranked=sort_by_time(ranked))
 
 
 def _with_most_positions(question: Question, known: Sequence[Candidate]) -> list[Candidate]:
@@ -89,19 +85,19 @@ def _with_most_positions(question: Question, known: Sequence[Candidate]) -> list
     more = list[Candidate | None]()
     for equipment in question.equipment:
         possible = [c for c in known if c.equipment == equipment]
-        best = _most_accurate(question, possible)
+        best = most_accurate(question, possible)
         if best is not None and not any(question.reached_by(c.tilt) for c in possible):
             kind = CalibrationKind.of(question, best)
             more.append(kind.best(kind.most))
     return [*known, *filter(None, more)]
 
 
-def _confirm(plan: Answer, candidate: Candidate, first: bool) -> Candidate | None:
+def _confirm(plan: Plan, candidate: Candidate, first: bool) -> Candidate | None:
     """The candidate, or one with a few more positions, that reaches the target in simulation.
 
     Parameters
     ----------
-    plan : Answer, its question and simulation
+    plan : Plan, its question and simulation
     candidate : Candidate, that reaches it by linear theory
     first : bool, whether it is the first with its equipment: then its positions are searched with
         more care, and one position less is simulated, too, until it does not suffice

@@ -16,18 +16,18 @@ from accelstudy.drawing.style import (
     approach_marker,
     log_ticks,
 )
-from accelstudy.planning.answer import Answer
 from accelstudy.planning.candidates import sort_by_time
+from accelstudy.planning.plan import Plan
 
 LABELS = {"gravity": "by hand, gravity alone", "robot": "with a robot"}
 IN_SIGHT = 8.0
 """Tilt error over the target up to which candidates are in the figure, if there are any."""
 
 
-def draw_plan(ax: Axes, answer: Answer) -> None:
+def draw_plan(ax: Axes, plan: Plan) -> None:
     """Draw all candidates, the front of the best, and the simulated candidates of the table."""
-    question, target = answer.question, float(to_display(answer.question.target, "rad"))
-    share, ordered = question.confidence, sort_by_time(answer.compared)
+    question, target = plan.question, float(to_display(plan.question.target, "rad"))
+    share, ordered = question.confidence, sort_by_time(plan.candidates)
     left = to_display(np.array([question.accuracy(c.tilt) for c in ordered]), "rad")
     minutes = np.array([c.seconds / 60 for c in ordered])
     for equipment in question.equipment:
@@ -37,7 +37,7 @@ def draw_plan(ax: Axes, answer: Answer) -> None:
         ax.scatter(*at, s=3, alpha=0.18, linewidth=0, rasterized=True, color=colour, zorder=2)
         front = chosen[left[chosen] < np.minimum.accumulate([np.inf, *left[chosen]])[:-1]]
         ax.step(minutes[front], left[front], where="post", color=colour, zorder=3)
-    for number, candidate in enumerate(answer.ranked, 1):
+    for number, candidate in enumerate(plan.ranked, 1):
         assert candidate.simulated is not None
         name, time = candidate.equipment.name, candidate.seconds / 60
         place = time, float(to_display(question.accuracy(candidate.simulated), "rad"))

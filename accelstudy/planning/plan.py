@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-import math
+from collections.abc import Sequence
+from dataclasses import dataclass, field
 from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -10,22 +11,21 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import yaml
 
-from accelstudy.basics.errors import InputError, UnknownNameError
+from accelstudy.basics.errors import InputError
 from accelstudy.basics.plugins import file_key
-from accelstudy.basics.progress import begin, say, show
+from accelstudy.basics.progress import say, show
 from accelstudy.basics.suggestions import study_again
 from accelstudy.basics.units import MGON
-from accelstudy.data_sheets import get_data_sheet, sheet_of_sigma
 from accelstudy.design.order import field_order
 from accelstudy.drawing.style import FULL
 from accelstudy.files.outputs import PLAN
 from accelstudy.pages.result import Result
 from accelstudy.planning import wording
-from accelstudy.planning.answer import Answer, answer
 from accelstudy.planning.candidates import Candidate
 from accelstudy.planning.design import write_scheme
-from accelstudy.planning.question import Equipment, Question
+from accelstudy.planning.question import Question
 from accelstudy.planning.reasons import limits
+from accelstudy.planning.simulated import study_of
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -39,65 +39,63 @@ STUDY_HEAD = """\
 ANGLES, UNKNOWN = ("roll", "pitch"), np.full(2, np.nan)
 
 
+@dataclass(frozen=True, eq=False, repr=False)
 class Plan(Result):
     """The cheapest calibrations for a tilt accuracy.
 
     Attributes
     ----------
-    answer : accelstudy.planning.answer.Answer, all of it
+    question : accelstudy.planning.question.Question
+    seed, replicates : int, of the simulation
+    candidates : list of accelstudy.planning.candidates.Candidate, all that were compared
+    ranked : list of Candidate, the cheapest of an equipment and a model each that reach the target,
+        simulated, by the time they take; empty if none does
     """
 
     kind = PLAN
     size = FULL, 95.0
 
-    def __init__(self, answer: Answer) -> None:
-        self.answer, self.name = answer, answer.question.sheet.name
+    question: Question
+    seed: int
+    replicates: int
+    candidates: list[Candidate]
+    ranked: list[Candidate] = field(default_factory=list)
 
-    @classmethod
-    def of(cls, **given: Any) -> Plan:
-        """Plan by the keywords of `accelstudy.plan`, checked."""
-        sensor, sigma, max_time = given["sensor"], given["sigma"], given["max_time"]
-        by_hand = Equipment("gravity", given["moving_time"], 0.0)
-        robot = Equipment("robot", given["robot_moving_time"], given["robot_setup_time"])
-        equipment = {"gravity": (by_hand,), "robot": (robot,), "both": (by_hand, robot)}
-        if given["equipment"] not in equipment:
-            raise UnknownNameError("equipment", given["equipment"], equipment)
-        if (sensor is None) == (sigma is None):
-            both = ", not both" if sensor else ""
-            raise InputError(f"plan: give the sensor by `sensor`, or its noise by `sigma`{both}")
-        sheet = get_data_sheet(sensor) if sigma is None else sheet_of_sigma(sigma)
-        if given["history"] is not None:
-            from accelstudy.data_sheets.measured import with_history  # slow to import
+    @property
+    def name(self) -> str:  # type: ignore[override]
+        """Name of the sensor."""
+        return self.question.sheet.name
 
-            sheet = with_history(sheet, given["history"])
-        asked = Question(
-            given["tilt_accuracy"],
-            given["tilt_range"],
-            sheet,
-            equipment[given["equipment"]],
-            given["confidence"],
-            tuple(sorted({*given["holds"]})),
-            given["robot_sigma"],
-            math.inf if max_time is None else max_time,
-            given["max_positions"],
-        )
-        begin("comparing calibrations, which takes some seconds ...")
-        return cls(answer(asked, given["seed"], given["replicates"]))
+    @property
+    def first(self) -> Candidate:
+        """The recommended candidate: by hand if that reaches the target, else with the robot."""
+        return min(self.ranked, key=lambda c: c.equipment.name != "gravity")
+
+    def best(self, equipment: str = "") -> Candidate | None:
+        """The most accurate candidate, of all or with one equipment, however long it takes."""
+        chosen = [c for c in self.candidates if equipment in ("", c.equipment.name)]
+        return most_accurate(self.question, chosen)
+
+    @property
+    def study(self) -> dict[str, Any]:
+        """Configuration of the study whose cells are the simulated candidates."""
+        chosen = sorted(self.ranked, key=lambda c: c is not self.first)
+        return study_of(self.question, chosen, self.seed, self.replicates)
 
     @property
     def exit_status(self) -> int:  # type: ignore[override]
         """1 if nothing reaches the accuracy."""
-        return 0 if self.answer.ranked else 1
+        return 0 if self.ranked else 1
 
     @property
     def state(self) -> str:
         """Whether a calibration reaches the accuracy: reached or unreachable."""
-        return "reached" if self.answer.ranked else "unreachable"
+        return "reached" if self.ranked else "unreachable"
 
     @property
     def verdict(self) -> str:
         """What to do, in one line."""
-        return wording.part_lines("answer", self.answer)[0]
+        return wording.part_lines("answer", self)[0]
 
     @property
     def content(self) -> dict[str, Any]:
@@ -113,7 +111,7 @@ class Plan(Result):
         """
         import pandas as pd  # slow to import, and not needed for what is printed
 
-        rows = [_row(self.answer, candidate) for candidate in self.answer.compared]
+        rows = [_row(self, candidate) for candidate in self.candidates]
         return pd.DataFrame(rows).astype({"rank": "Int64"})
 
     @property
@@ -129,7 +127,7 @@ class Plan(Result):
         """Draw the tilt error left over the time in the field."""
         from accelstudy.planning.figure import draw_plan  # Matplotlib is slow to import
 
-        draw_plan(ax, self.answer)
+        draw_plan(ax, self)
 
     def write(self, folder: Path, place: Path) -> None:
         """Write what `accelstudy plan` does; raises `InputError` if nothing is reached."""
@@ -140,15 +138,15 @@ class Plan(Result):
         from accelstudy.drawing.style import DPI, STYLE, new_figure
         from accelstudy.files.tables import write_table
 
-        if not self.answer.ranked:
+        if not self.ranked:
             raise InputError(self.verdict)
-        provenance = {"config_hash": None, "seed": self.answer.seed}
+        provenance = {"config_hash": None, "seed": self.seed}
         write_table(folder / "plan.parquet", self.compared, provenance)
         head = STUDY_HEAD.format(command=study_again(place / "study.yaml"))
-        study = {**file_key(), **self.answer.study}
+        study = {**file_key(), **self.study}
         content = yaml.safe_dump(study, sort_keys=False, allow_unicode=True)
         (folder / "study.yaml").write_text(head + content, encoding="utf-8")
-        first = self.answer.first
+        first = self.first
         directions = first.scheme.directions
         if first.search is not None:
             directions = directions[field_order(first.search.task, directions)]
@@ -162,14 +160,14 @@ class Plan(Result):
 
     def tell(self, place: Path | None) -> None:
         """Print the answer, the table and the assumptions."""
-        if not self.answer.ranked:
+        if not self.ranked:
             show(self.verdict)
             return
         answer, how_to, reasons, assumptions = (
-            "\n".join(wording.part_lines(part, self.answer))
+            "\n".join(wording.part_lines(part, self))
             for part in ("answer", "how_to", "reasons", "assumptions")
         )
-        table = "\n".join(wording.table_lines(self.answer))
+        table = "\n".join(wording.table_lines(self))
         show(f"{answer}\n\n{how_to}")
         say(f"\n{table}\n\n{reasons}\n\n{assumptions}\n")
         if place is None:
@@ -180,8 +178,8 @@ class Plan(Result):
             say(f"the same numbers again: {study_again(place / 'study.yaml')}")
 
 
-def _row(answer: Answer, c: Candidate) -> dict[str, Any]:
-    rank = answer.ranked.index(c) + 1 if c in answer.ranked else None
+def _row(plan: Plan, c: Candidate) -> dict[str, Any]:
+    rank = plan.ranked.index(c) + 1 if c in plan.ranked else None
     row = {
         "equipment": c.equipment.name,
         "model": c.model.name,
@@ -192,9 +190,9 @@ def _row(answer: Answer, c: Candidate) -> dict[str, Any]:
         "sensor_sigma_mps2": c.sigma,
         "minutes": c.seconds / 60,
         "redundancy": c.redundancy,
-        "reaches": answer.question.reached_by(c.tilt),
+        "reaches": plan.question.reached_by(c.tilt),
         "rank": rank,
-        "limited_by": limits(answer.question, c) if rank else None,
+        "limited_by": limits(plan.question, c) if rank else None,
         "cell": None if c.simulated is None else c.simulated.cell,
     }
     left = {"rms": c.tilt.rms, "rms_simulated": UNKNOWN, "rms_q95_simulated": UNKNOWN}
@@ -204,3 +202,8 @@ def _row(answer: Answer, c: Candidate) -> dict[str, Any]:
         both = c.simulated.quantile_of_both(0.95)
     angles = {f"{a}_{k}_mgon": v[i] / MGON for k, v in left.items() for i, a in enumerate(ANGLES)}
     return {**row, **angles, "both_rms_q95_simulated_mgon": both / MGON}
+
+
+def most_accurate(question: Question, chosen: Sequence[Candidate]) -> Candidate | None:
+    """The candidate that leaves least; None of none."""
+    return min(chosen, key=lambda c: question.accuracy(c.tilt), default=None)

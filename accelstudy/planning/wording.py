@@ -6,6 +6,7 @@ The sentences stand in `wording.txt.j2`; here are the phrases of which it makes 
 from __future__ import annotations
 
 import sys
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -21,7 +22,6 @@ from accelstudy.basics.units import (  # noqa: F401
 from accelstudy.basics.wording import amount, interval, number, quantity_text, words
 from accelstudy.design.criteria import MINIMAX
 from accelstudy.pages import render_lines
-from accelstudy.planning.answer import Answer
 from accelstudy.planning.candidates import Candidate, shortest  # noqa: F401
 from accelstudy.planning.question import Question
 from accelstudy.planning.reasons import (  # noqa: F401
@@ -37,6 +37,9 @@ from accelstudy.planning.reasons import (  # noqa: F401
 from accelstudy.sensors.models import NINE
 from accelstudy.sensors.sensor import SensorModel
 
+if TYPE_CHECKING:
+    from accelstudy.planning.plan import Plan
+
 SENTENCES = "planning/wording.txt.j2"
 QUOTED = 0.95
 """Share of the calibrations that is quoted where the rms is asked for."""
@@ -44,9 +47,9 @@ QUOTED = 0.95
 HERE = sys.modules[__name__]
 
 
-def part_lines(part: str, answer: Answer) -> list[str]:
+def part_lines(part: str, plan: Plan) -> list[str]:
     """Lines of a part of a plan: what to do (answer), how_to, reasons or assumptions."""
-    return render_lines(SENTENCES, part, answer, HERE)
+    return render_lines(SENTENCES, part, plan, HERE)
 
 
 def assumed_sizes(question: Question) -> list[str]:
@@ -58,14 +61,14 @@ def assumed_sizes(question: Question) -> list[str]:
     return [f"{PLAIN[effect]} ({size})" for effect, size in sizes.items()]
 
 
-def table_lines(answer: Answer) -> list[str]:
+def table_lines(plan: Plan) -> list[str]:
     """The ranked candidates as a table, and what its columns mean."""
     unit = display_unit("rad")
     head = [
         "", "equipment", "model", "scheme", "positions", "s each", "minutes",
         f"roll/{unit}", f"pitch/{unit}", f"both/{unit}", "limited by",
     ]  # fmt: skip
-    table = np.array([head, *(_row(answer, i, c) for i, c in enumerate(answer.ranked, 1))])
+    table = np.array([head, *(_row(plan, i, c) for i, c in enumerate(plan.ranked, 1))])
     aligned = [
         (np.char.rjust if 4 <= i < 10 else np.char.ljust)(column, max(map(len, column)))
         for i, column in enumerate(table.T)
@@ -74,12 +77,12 @@ def table_lines(answer: Answer) -> list[str]:
         *("  ".join(cells).rstrip() for cells in zip(*aligned, strict=True)),
         "model: number of parameters, and effects besides bias, scale and angles between axes;",
         "roll, pitch: rms, and interval with 95 of 100 calibrations of each angle by itself, from",
-        f"{answer.replicates} simulated ones each;",
+        f"{plan.replicates} simulated ones each;",
         "both: what roll and pitch both stay below in 95 of 100 calibrations",
     ]
 
 
-def _row(answer: Answer, rank: int, candidate: Candidate) -> list[str]:
+def _row(plan: Plan, rank: int, candidate: Candidate) -> list[str]:
     left = candidate.simulated
     assert left is not None
     ends = (left.rms, left.quantile(0.025), left.quantile(0.975))
@@ -97,7 +100,7 @@ def _row(answer: Answer, rank: int, candidate: Candidate) -> list[str]:
         f"{candidate.seconds / 60:.1f}",
         *cells,
         amount(left.quantile_of_both(QUOTED), "rad"),
-        limits(answer.question, candidate),
+        limits(plan.question, candidate),
     ]
 
 

@@ -96,9 +96,9 @@ def plan(
         accelstudy plan --tilt-accuracy 10mgon --tilt-range 30gon --sigma 2mm/s2
     """
     given = {**locals()}
-    from accelstudy.planning.plan import Plan
+    from accelstudy.planning.answer import plan_for
 
-    return Plan.of(**given)
+    return plan_for(**given)
 
 
 @verb

@@ -63,7 +63,7 @@ def told():
         return plans[0]
 
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr("accelstudy.planning.plan.answer", kept)
+        patch.setattr("accelstudy.planning.answer.answer", kept)
         printed = succeed(*QUESTION.split()).stdout
     return plans[0], printed
 
@@ -142,7 +142,7 @@ def test_the_answer_is_the_cheapest_that_reaches_the_target(plan):
     assert first.model.name == NINE.name
     assert first.simulated.rms.max() <= 10 * MGON
     cheaper = [
-        c for c in plan.compared
+        c for c in plan.candidates
         if c.equipment == BY_HAND and c.seconds < first.seconds and c.tilt.rms.max() <= 10 * MGON
     ]  # fmt: skip
     assert all(
