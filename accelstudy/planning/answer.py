@@ -104,7 +104,7 @@ def _confirm(plan: Plan, candidate: Candidate, first: bool) -> Candidate | None:
     """
     question, n, reached, missed = plan.question, candidate.scheme.n_positions, None, None
     kind, starts = CalibrationKind.of(question, candidate), STARTS if first else 1
-    tried = kind.best(n, starts) if candidate.search else candidate
+    tried = candidate if candidate.starts in (0, starts) else kind.best(n, starts)
     for _ in range(MAX_TRIES):
         if tried is None:
             break
