@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -17,7 +17,9 @@ from accelstudy.drawing.style import (
     log_ticks,
 )
 from accelstudy.planning.candidates import sort_by_time
-from accelstudy.planning.plan import Plan
+
+if TYPE_CHECKING:
+    from accelstudy.planning.plan import Plan
 
 LABELS = {"gravity": "by hand, gravity alone", "robot": "with a robot"}
 IN_SIGHT = 8.0
