@@ -1,7 +1,6 @@
 PYTHON ?= python3
 CORES ?= 2
 CONFIG ?= config/config.yaml
-CAMPAIGNS ?= config/campaigns.yaml
 HIDDEN ?= studies/hidden/config/hidden-effects.yaml
 FOLDER ?= resources/public
 
@@ -34,7 +33,7 @@ help: ## list the targets
 	@awk -F ':.*## ' '/^[a-z-]+:.*## / { printf "%-18s%s\n", $$1, $$2 }' Makefile
 	@echo 'PYTHON=python3.12 chooses the interpreter of a new environment, CORES=8 the cores used,'
 	@echo 'CONFIG=config/smoke.yaml the study of `make anew`,'
-	@echo 'CAMPAIGNS=my.yaml the batch of `make campaigns`, HIDDEN=my.yaml the study of `make hidden-effects`.'
+	@echo 'HIDDEN=my.yaml the study of `make hidden-effects`.'
 
 env: $(READY) ## make the environment, from locked versions, in .venv
 
@@ -84,9 +83,6 @@ unlock: $(READY) ## remove the lock of a run that was killed
 
 report: reproduce ## make results/paper/report.zip, to be opened in a browser
 	snakemake --cores $(CORES) --report results/paper/report.zip
-
-campaigns: $(READY) ## calibrate the campaigns of a batch, by default public ones
-	snakemake --cores $(CORES) --snakefile workflow/campaigns.smk --configfile $(CAMPAIGNS)
 
 positions: $(READY) ## study how good schemes are, and sessions that stop by themselves
 	python -m studies.positions results/positions

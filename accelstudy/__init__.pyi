@@ -1,5 +1,6 @@
 # What users import from accelstudy, for type checkers and editors, and for `__init__.py`.
 from accelstudy.basics.errors import InputError as InputError
+from accelstudy.campaign.batch import Batch as Batch
 from accelstudy.campaign.calibration.result import Calibration as Calibration
 from accelstudy.campaign.importing.log import Log as Log
 from accelstudy.campaign.session import Campaign as Campaign
@@ -30,6 +31,7 @@ from accelstudy.verbs.planning import data_sheet as data_sheet
 from accelstudy.verbs.planning import find_positions as find_positions
 from accelstudy.verbs.planning import plan as plan
 from accelstudy.verbs.planning import simulate as simulate
+from accelstudy.verbs.sensors import batch as batch
 from accelstudy.verbs.sensors import compare as compare
 from accelstudy.verbs.sensors import history as history
 from accelstudy.verbs.sensors import lot as lot

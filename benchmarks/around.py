@@ -49,7 +49,7 @@ def diagnoses():
     """Diagnoses in a batch, beside least squares of the same campaigns."""
     loop, found = WAYS.get("scipy_jacobian")(get_approach("robot")), []
     for hidden, effects in HIDDEN.items():
-        campaigns = [simulate_campaign(settings(effects, seed))[0] for seed in range(CAMPAIGNS)]
+        campaigns = [simulate_campaign(settings(effects, seed)) for seed in range(CAMPAIGNS)]
         works = {
             "diagnosis": lambda campaigns=campaigns: [diagnose(c, MODEL) for c in campaigns],
             "fit": lambda c=campaigns[0]: [loop.solve_one(c.forces, c.angles) for _ in range(FITS)],

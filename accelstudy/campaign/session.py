@@ -54,6 +54,7 @@ class Campaign:
         if there are none
     warnings : tuple of str, what was ignored when the campaign was read
     notes : tuple of str, what the import of its log found and assumed
+    truth : mapping, of a simulated campaign: the settings, and all that was drawn
     """
 
     name: str
@@ -83,6 +84,7 @@ class Campaign:
     warnings: tuple[str, ...] = field(default=())
     notes: tuple[str, ...] = field(default=())
     sensor_type: SensorType | None = None
+    truth: Mapping[str, Any] = field(default_factory=dict)
 
     def __repr__(self) -> str:
         return f"Campaign({self.name!r}, {plural(self.n_positions, 'position')})"

@@ -3,8 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
-from dataclasses import asdict, dataclass, field, fields, replace
+from dataclasses import asdict, dataclass, fields
 from pathlib import Path
 from typing import Any
 
@@ -17,11 +16,10 @@ from accelstudy.basics import bounds
 from accelstudy.basics.errors import InputError, UnknownNameError
 from accelstudy.basics.registry import WithSettings
 from accelstudy.basics.units import MGON, STANDARD_GRAVITY
-from accelstudy.campaign.gross_errors import GrossError, get_gross_error
 from accelstudy.campaign.session import Campaign
 from accelstudy.effects import Effect, get_effect
 from accelstudy.files.outputs import whole_file
-from accelstudy.noise_effects import NoiseEffect, get_noise_effect
+from accelstudy.noise_effects import get_noise_effect
 from accelstudy.schemes import get_scheme
 from accelstudy.sensors.models import compose, get_model
 from accelstudy.simulation.hold_plan import PROVIDES, HoldPlan
@@ -29,20 +27,10 @@ from accelstudy.simulation.sessions import Noise, session
 
 Array = NDArray[np.float64]
 
-STREAMS = ("sensor", "effects", "order", "noise", "sd", "gross")
+STREAMS = ("sensor", "effects", "order", "noise", "sd")
 """Streams of random numbers, one for each kind of draw, so that none changes another."""
 
 ORDERS = ("scheme", "random")
-
-_RANGES = {
-    "seed": bounds.SEED,
-    "repeats": bounds.POSITIONS,
-    "repeat_first": replace(bounds.POSITIONS, least=0),
-    "n_samples": bounds.SAMPLES,
-    "sigma": bounds.SIGMA_FORCE,
-    "gravity": bounds.GRAVITY,
-    "size": bounds.SIZE,
-}
 
 
 @dataclass(frozen=True)
@@ -63,7 +51,7 @@ class CampaignSettings:
         SI, "thermal_bias: 0.004, -0.002, 0.001"; one of an effect of the model replaces it
     size : float, factor of the parameters of `effects` that are not given; they are as large as
         the larger typical size, with random signs
-    noise_effects, gross_errors : tuple of str
+    noise_effects : tuple of str
     sigma : float, m/s², of a position mean
     sigma_known : bool, whether the campaign states it
     robot_sigma : float, rad, of the robot's roll and pitch
@@ -83,7 +71,6 @@ class CampaignSettings:
     effects: tuple[str, ...] = ()
     size: float = 1.0
     noise_effects: tuple[str, ...] = ()
-    gross_errors: tuple[str, ...] = ()
     sigma: float = 0.002
     sigma_known: bool = True
     robot_sigma: float = 3.2 * MGON
@@ -95,35 +82,14 @@ class CampaignSettings:
     yaw: str = "none"
     n_samples: int | None = None
 
-    def __post_init__(self) -> None:
-        if self.order not in ORDERS:
-            raise UnknownNameError("order", self.order, ORDERS)
-        for key, allowed in _RANGES.items():
-            if (value := getattr(self, key)) is not None:
-                allowed.check_key(key, value)
-        bounds.SIGMA_ANGLE.check_key("robot_sigma", self.robot_sigma / MGON)
-        n = self.repeats * get_scheme(self.scheme).n_positions + self.repeat_first
-        bounds.POSITIONS.check_key("repeats: number of positions", n)
-
     @property
     def holds(self) -> HoldPlan:
         """Conditions of the holds."""
         return HoldPlan(**{one.name: getattr(self, one.name) for one in fields(HoldPlan)})
 
 
-def simulate_campaign(settings: CampaignSettings) -> tuple[Campaign, dict[str, Any]]:
-    """Simulate a campaign.
-
-    Parameters
-    ----------
-    settings : CampaignSettings
-
-    Returns
-    -------
-    campaign : Campaign
-    truth : dict
-        Plain data: the settings, and everything that was drawn, which are the parameters of the
-        sensor and of the effects, and the settings of the gross errors.
+def simulate_campaign(settings: CampaignSettings) -> Campaign:
+    """Simulate a campaign, with all that was drawn as its truth.
 
     Raises
     ------
@@ -132,13 +98,13 @@ def simulate_campaign(settings: CampaignSettings) -> tuple[Campaign, dict[str, A
     """
     seeds = np.random.SeedSequence(settings.seed).spawn(len(STREAMS))
     rng = {name: np.random.default_rng(s) for name, s in zip(STREAMS, seeds, strict=True)}
-    hidden = _hidden_effects(settings, rng["effects"])
-    sensor = []
+    hidden = [_hidden_effect(text, settings.size, rng["effects"]) for text in settings.effects]
+    names, sensor = {effect.name for effect, _ in hidden}, []
     for effect in get_model(settings.model).effects:
         # Of random sign, with sizes that are log-uniform between the typical sizes.
         n, (low, high) = len(effect.parameters), np.log(effect.typical)
         sizes = np.exp(rng["sensor"].uniform(low, high, n)) * rng["sensor"].choice([-1.0, 1.0], n)
-        if effect.name not in {other.name for other, _ in hidden}:
+        if effect.name not in names:
             sensor.append((effect, sizes))
     present = [*sensor, *hidden]
     model = compose("simulated", tuple(effect.spec for effect, _ in present))
@@ -152,12 +118,20 @@ def simulate_campaign(settings: CampaignSettings) -> tuple[Campaign, dict[str, A
                 f"{PROVIDES[column]}: missing; the effect {effect.name!r} needs the {column} of "
                 "each hold"
             )
-    parameters = np.concatenate([values for _, values in present])
     noise = Noise(settings.sigma, settings.robot_sigma, effects=settings.noise_effects)
+    parameters = np.concatenate([values for _, values in present])
     ideal = session(model, parameters, directions, settings.gravity, hold)
     drawn = ideal.draw(noise, 1, rng["noise"])
     robot = get_approach(settings.approach).uses_angles
-    campaign = Campaign(
+    samples: dict[str, Any] = {}
+    if settings.n_samples is not None:
+        n = settings.n_samples
+        # σ√n, with the scatter of the sd of normal samples.
+        within = np.prod([effect.within_hold for effect in noise_effects], axis=0)
+        scatter = np.sqrt(rng["sd"].chisquare(n - 1, (len(directions), 3)) / (n - 1))
+        sd = settings.sigma * np.sqrt(n) * within * scatter
+        samples = {"n_samples": np.full(len(directions), n), "sd": sd}
+    return Campaign(
         name=settings.name,
         positions=np.arange(1, len(directions) + 1),
         forces=drawn.forces[0],
@@ -165,136 +139,83 @@ def simulate_campaign(settings: CampaignSettings) -> tuple[Campaign, dict[str, A
         sigma_force=settings.sigma if settings.sigma_known else None,
         angles=drawn.angles[0] if robot and drawn.angles is not None else None,
         sigma_angle=settings.robot_sigma if robot else None,
+        **samples,
         time=hold.time,
         temperature=hold.temperature,
         vibration=hold.vibration,
         yaw=hold.yaw if robot and settings.yaw != "none" else None,
-        **_samples(settings, noise_effects, len(directions), rng["sd"]),
+        truth={
+            "schema_version": 1,
+            "campaign": settings.name,
+            "seed": settings.seed,
+            "sensor": [_with_parameters(*pair) for pair in sensor],
+            "effects": [_with_parameters(*pair) for pair in hidden],
+            "noise": {
+                "sigma_mps2": settings.sigma,
+                "effects": [_name_and_settings(effect) for effect in noise_effects],
+            },
+            "settings": {
+                key: list(value) if isinstance(value, tuple) else value
+                for key, value in asdict(settings).items()
+            },
+        },
     )
-    gross = []
-    for spec in settings.gross_errors:
-        gross.append(get_gross_error(spec).draw(campaign, rng["gross"]))
-        campaign = gross[-1].act(campaign)
-    return campaign, _truth(settings, sensor, hidden, noise_effects, gross)
 
 
-@dataclass(frozen=True, eq=False, repr=False)
-class SimulatedCampaign(Campaign):
-    """A campaign of which the truth is known.
-
-    Attributes
-    ----------
-    truth : mapping, the settings, and everything that was drawn
-    """
-
-    truth: Mapping[str, Any] = field(default_factory=dict)
-
-    @classmethod
-    def of(cls, *, name: str | None, **settings: Any) -> SimulatedCampaign:
-        """Simulate a campaign by the keywords of `simulate_campaign`, checked."""
-        campaign, truth = simulate_campaign(CampaignSettings(name=name or "simulated", **settings))
-        values = {one.name: getattr(campaign, one.name) for one in fields(campaign)}
-        return cls(**values, truth=truth)
-
-
-def write_truth(truth: dict[str, Any], path: str | Path) -> None:
+def write_truth(campaign: Campaign, path: str | Path) -> None:
     """Write the truth as YAML."""
-    text = yaml.safe_dump(truth, sort_keys=False, allow_unicode=True)
+    text = yaml.safe_dump(dict(campaign.truth), sort_keys=False, allow_unicode=True)
     with whole_file(path) as temporary:
         temporary.write_text(text, encoding="utf-8")
 
 
-def _hidden_effects(
-    settings: CampaignSettings, rng: np.random.Generator
-) -> list[tuple[Effect, Array]]:
-    """Effects beyond the model with their parameters."""
-    effects = []
-    for text in settings.effects:
-        spec, colon, numbers = text.partition(":")
-        effect = get_effect(spec.strip())
-        n = len(effect.parameters)
-        values = settings.size * effect.typical[1] * rng.choice([-1.0, 1.0], n)
-        if colon:
-            try:
-                values = np.array([float(part) for part in numbers.split(",")])
-            except ValueError:
-                values = np.array([np.nan])
-            if len(values) != n or not np.isfinite(values).all():
-                names = ", ".join(f"{p.name} in {p.unit}" for p in effect.parameters)
-                raise InputError(f"effect {text!r}: expected {n} numbers after the colon ({names})")
-        effects.append((effect, values))
-    return effects
+def _hidden_effect(text: str, size: float, rng: np.random.Generator) -> tuple[Effect, Array]:
+    """Read an effect beyond the model, with its parameters if they are given."""
+    spec, colon, numbers = text.partition(":")
+    effect = get_effect(spec.strip())
+    n = len(effect.parameters)
+    values = size * effect.typical[1] * rng.choice([-1.0, 1.0], n)
+    if colon:
+        try:
+            values = np.array([float(part) for part in numbers.split(",")])
+        except ValueError:
+            values = np.array([np.nan])
+        if len(values) != n or not np.isfinite(values).all():
+            names = ", ".join(f"{p.name} in {p.unit}" for p in effect.parameters)
+            raise InputError(f"effect {text!r}: expected {n} numbers after the colon ({names})")
+    return effect, values
 
 
 def _directions(settings: CampaignSettings, rng: np.random.Generator) -> Array:
-    directions = np.tile(get_scheme(settings.scheme).directions, (settings.repeats, 1))
+    """Directions of the holds in their order, (n, 3)."""
+    once, first = get_scheme(settings.scheme).directions, settings.repeat_first
+    bounds.POSITIONS.check_key("repeats: number of positions", settings.repeats * len(once) + first)
+    directions = np.tile(once, (settings.repeats, 1))
+    if settings.order not in ORDERS:
+        raise UnknownNameError("order", settings.order, ORDERS)
     if settings.order == "random":
         directions = rng.permutation(directions)
-    if settings.repeat_first > len(directions):
+    if first > len(directions):
         raise InputError(
             f"repeat_first: must be at most {len(directions)}, the holds of {settings.scheme}, "
-            f"not {settings.repeat_first}"
+            f"not {first}"
         )
-    return np.concatenate([directions, directions[: settings.repeat_first]])
+    return np.concatenate([directions, directions[:first]])
 
 
-def _samples(
-    settings: CampaignSettings,
-    noise_effects: Sequence[NoiseEffect],
-    n_positions: int,
-    rng: np.random.Generator,
-) -> dict[str, Any]:
-    """Numbers of samples, and their sds: σ√n with the scatter of the sd of normal samples."""
-    n = settings.n_samples
-    if n is None:
-        return {}
-    sigma = settings.sigma * np.sqrt(n) * np.prod([e.within_hold for e in noise_effects], axis=0)
-    scatter = np.sqrt(rng.chisquare(n - 1, (n_positions, 3)) / (n - 1))
-    return {"n_samples": np.full(n_positions, n), "sd": sigma * scatter}
-
-
-def _truth(
-    settings: CampaignSettings,
-    sensor: Sequence[tuple[Effect, Array]],
-    hidden: Sequence[tuple[Effect, Array]],
-    noise_effects: Sequence[NoiseEffect],
-    gross: Sequence[GrossError],
-) -> dict[str, Any]:
-    def described(effect: Effect, values: Array) -> dict[str, Any]:
-        return {
-            **_name_and_settings(effect),
-            "parameters": [
-                {"name": p.name, "value": float(value), "unit": p.unit}
-                for p, value in zip(effect.parameters, values, strict=True)
-            ],
-        }
-
-    return {
-        "schema_version": 1,
-        "campaign": settings.name,
-        "seed": settings.seed,
-        "sensor": [described(*pair) for pair in sensor],
-        "effects": [described(*pair) for pair in hidden],
-        "noise": {
-            "sigma_mps2": settings.sigma,
-            "effects": [_name_and_settings(effect) for effect in noise_effects],
-        },
-        "gross_errors": [_name_and_settings(error) for error in gross],
-        "settings": {
-            key: list(value) if isinstance(value, tuple) else value
-            for key, value in asdict(settings).items()
-        },
-    }
+def _with_parameters(effect: Effect, values: Array) -> dict[str, Any]:
+    """Name, settings and parameters of an effect."""
+    pairs = zip(effect.parameters, values.tolist(), strict=True)
+    parameters = [{"name": p.name, "value": value, "unit": p.unit} for p, value in pairs]
+    return {**_name_and_settings(effect), "parameters": parameters}
 
 
 def _name_and_settings(item: WithSettings) -> dict[str, Any]:
     """Name and settings, each setting with its unit."""
     units = {setting.name: setting.unit for setting in item.takes}
-    return {
-        "name": item.name,
-        "settings": {
-            name: {"value": float(value), "unit": units[name]}
-            for name, value in item.settings.items()
-            if not math.isnan(value)
-        },
+    settings = {
+        name: {"value": float(value), "unit": units[name]}
+        for name, value in item.settings.items()
+        if not math.isnan(value)
     }
+    return {"name": item.name, "settings": settings}

@@ -76,7 +76,7 @@ def tell_public(table: pd.DataFrame) -> None:
 
 
 def tell_effects(table: pd.DataFrame) -> None:
-    """Print effects of the sensor and of the rig, noise effects and gross errors, or a table.
+    """Print effects of the sensor and of the rig, and noise effects, or a table.
 
     Parameters and typical sizes are in the units shown to people, settings in SI as specs have
     them.
@@ -88,7 +88,7 @@ def tell_effects(table: pd.DataFrame) -> None:
         tell_table(table)
         return
     parts = {f"Effects of the {part}": table[table["part"] == part] for part in ("sensor", "rig")}
-    parts |= {name.capitalize(): catalogue(name) for name in ("noise effects", "gross errors")}
+    parts["Noise effects"] = catalogue("noise effects")
     texts = ("\n".join([f"{head}\n", *_items(rows)]) for head, rows in parts.items())
     click.echo("\n\n".join(texts))
     say(f"\n{angle_note()}.")

@@ -38,9 +38,9 @@ def simulate_campaign(
         stage("simulation"),
     ):
         campaign = campaigns.simulate_campaign(name=name or out.resolve().name, **given)
-        write_campaign(campaign, folder, plausible=not given["gross_errors"])
+        write_campaign(campaign, folder)
         if truth_file is not None:
-            write_truth(dict(campaign.truth), truth_file)
+            write_truth(campaign, truth_file)
     click.echo(f"campaign: {out} ({campaign.n_positions} positions)")
 
 
@@ -111,7 +111,7 @@ SECTIONS = {
             options=[click.Option(["--truth"], type=PATH, help="YAML file for the truth.")],
             sections={
                 "What is written": "out truth name seed",
-                "The sensor": "model effects size noise_effects gross_errors",
+                "The sensor": "model effects size noise_effects",
                 "Its noise": "sigma sigma_known robot_sigma n_samples",
                 "The holds": "scheme repeats repeat_first order approach yaw gravity",
                 "Their conditions": "interval temperature temperature_order vibration",
@@ -120,6 +120,7 @@ SECTIONS = {
         Command(planning.advise),
         Command(calibrations.calibrate, writes=outputs.CALIBRATION),
         Command(calibrations.diagnose, writes=outputs.DIAGNOSIS),
+        Command(sensors.batch, writes=outputs.BATCH),
         Command(sensors.lot, writes=outputs.LOT),
         Command(calibrations.check_sigmas, tell=listings.tell_sigmas),
         Command(

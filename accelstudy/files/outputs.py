@@ -45,12 +45,6 @@ class OutputKind:
         return files
 
 
-BATCH_JOB = OutputKind(
-    "job of a batch",
-    "status.json",
-    ("calibration.json", "positions.parquet", "report.html"),
-    ("figures", "campaign"),
-)
 DIAGNOSIS = OutputKind(
     "diagnosis",
     "diagnosis.json",
@@ -67,6 +61,7 @@ CAMPAIGN = OutputKind(
     ("positions.csv", "segmentation.svg", "segmentation.png"),
     replaced=False,
 )
+BATCH = OutputKind("batch", "campaigns.parquet", ("parameters.parquet", "report.html"), ("each",))
 COMPARISON = OutputKind(
     "comparison of calibrations", "comparison.json", ("report.html",), ("figures",)
 )
@@ -84,11 +79,11 @@ STUDY = OutputKind(
     "study",
     "Snakefile",
     ("README.md", "config/config.yaml", "sensor.yaml"),
-    ("profiles", "campaigns/example"),
+    ("profiles",),
     replaced=False,
 )
 _WITH_MARKERS = (
-    *(BATCH_JOB, DIAGNOSIS, CALIBRATION, CAMPAIGN, COMPARISON, HISTORY, LOT, PLAN, SIMULATION),
+    *(BATCH, DIAGNOSIS, CALIBRATION, CAMPAIGN, COMPARISON, HISTORY, LOT, PLAN, SIMULATION),
     ADVICE,
 )
 """Kinds that a folder is recognised as; one that holds the files of another comes first."""

@@ -10,31 +10,18 @@ from pathlib import Path
 import yaml
 
 from accelstudy.basics.plugins import file_key
-from accelstudy.campaign.format import write_campaign
-from accelstudy.campaign.simulated import CampaignSettings, simulate_campaign
 from accelstudy.files.outputs import STUDY, result_folder
 from accelstudy.files.shipped import shipped
 
 TEMPLATE = Path(__file__).with_name("template")
-TEMPLATES = {
-    "study": "A Monte Carlo study of accelerometer calibrations",
-    "campaigns": "A batch of measured campaigns",
-}
-"""What may be set up, and what it is."""
-RETIRED = {
-    "plan": "`accelstudy plan` needs no folder",
-    "diagnose": "`accelstudy simulate-campaign` and `accelstudy diagnose` need no folder",
-}
-"""Templates of earlier versions, and what takes their place."""
 
 
-def new_study(folder: Path, template: str = "study", force: bool = False) -> str:
+def new_study(folder: Path, force: bool = False) -> str:
     """Write the folder of a new study.
 
     Parameters
     ----------
     folder : Path, made if it is not there
-    template : str, one of `TEMPLATES`
     force : bool, whether to replace files of the same names
 
     Returns
@@ -48,22 +35,18 @@ def new_study(folder: Path, template: str = "study", force: bool = False) -> str
     """
     name = re.sub(r"[^A-Za-z0-9]+", "-", folder.resolve().name).strip("-") or "study"
     sources = {
-        "Snakefile": f"{template}.smk",
-        "config/config.yaml": f"{template}.yaml",
+        "Snakefile": "study.smk",
+        "config/config.yaml": "study.yaml",
         "README.md": "README.md",
     }
     with result_folder(folder, STUDY, [], force=force) as new:
         (new / "config").mkdir()
         for target, source in sources.items():
             text = (TEMPLATE / source).read_text(encoding="utf-8")
-            text = text.replace("NAME", name).replace("WHAT", TEMPLATES[template])
-            (new / target).write_text(text, encoding="utf-8")
+            (new / target).write_text(text.replace("NAME", name), encoding="utf-8")
         if named := file_key():  # the workflow runs in the new folder
             named = {k: {os.path.abspath(p): d for p, d in v.items()} for k, v in named.items()}
             with (new / "config" / "config.yaml").open("a", encoding="utf-8") as file:
                 file.write(f"\n{yaml.safe_dump(named)}")
         shutil.copytree(shipped("profiles"), new / "profiles")
-        if template == "campaigns":  # an example, to begin with
-            example, _ = simulate_campaign(CampaignSettings(name="example"))
-            write_campaign(example, new / "campaigns" / "example")
     return name

@@ -210,7 +210,7 @@ def export(calibration: Calibration | str | PathLike[str], *, form: str = "c") -
     calibration : Calibration or path
         A calibration.json.
     form : str
-        Form: c, matrix or px4.
+        Form: c, c-double, matrix or px4.
 
     Returns
     -------

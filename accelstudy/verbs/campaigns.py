@@ -17,7 +17,6 @@ if TYPE_CHECKING:
     import pandas as pd
 
     from accelstudy import Campaign, Log
-    from accelstudy.campaign.simulated import SimulatedCampaign
 
 SIGMA = si("m/s^2", bounds.SIGMA_FORCE.least, bounds.SIGMA_FORCE.most)
 INTERVAL = si("s", bounds.INTERVAL.least, bounds.INTERVAL.most)
@@ -256,7 +255,6 @@ def simulate_campaign(
     effects: kinds.EffectName | Sequence[kinds.EffectName] = (),
     size: Annotated[Quantity, si("1", bounds.SIZE.least, bounds.SIZE.most)] = 1,
     noise_effects: kinds.NoiseEffectName | Sequence[kinds.NoiseEffectName] = (),
-    gross_errors: kinds.GrossErrorName | Sequence[kinds.GrossErrorName] = (),
     sigma: Annotated[Quantity, SIGMA] = "2mm/s^2",
     sigma_known: bool = True,
     robot_sigma: RobotSigma = "3.2mgon",
@@ -267,12 +265,12 @@ def simulate_campaign(
     vibration: Annotated[Ends | None, kinds.numbers("two numbers, as 0:1", ":", 2)] = None,
     yaw: str = "none",
     n_samples: Annotated[int, bounds.SAMPLES] | None = None,
-) -> SimulatedCampaign:
+) -> Campaign:
     """Simulate a campaign with effects of your choice.
 
-    It can have noise effects and gross errors, too; `accelstudy effects` lists them. What is not
-    given is drawn at random, from the seed. The truth is `truth` of the campaign; the command
-    writes it to --truth and nowhere else.
+    It can have noise effects, too; `accelstudy effects` lists them. What is not given is drawn at
+    random, from the seed. The truth is `truth` of the campaign; the command writes it to --truth
+    and nowhere else.
 
     Parameters
     ----------
@@ -293,8 +291,6 @@ def simulate_campaign(
         Factor of the typical size of each effect of `effects` without parameters.
     noise_effects : str, or several
         A noise effect, as 'heavy_tails(nu=3)'.
-    gross_errors : str, or several
-        A gross error, as 'row_order(first=3, second=4)'.
     sigma : float in m/s², or str with a unit
         Sd of a position's mean.
     sigma_known : bool
@@ -330,7 +326,8 @@ def simulate_campaign(
     --------
         accelstudy simulate-campaign --out blind --truth truth.yaml --effect "warm_up(tau=400)"
     """
-    given = {**locals()}
-    from accelstudy.campaign.simulated import SimulatedCampaign
+    settings = {**locals()}
+    from accelstudy.campaign.simulated import CampaignSettings
+    from accelstudy.campaign.simulated import simulate_campaign as simulate
 
-    return SimulatedCampaign.of(**given)
+    return simulate(CampaignSettings(**{**settings, "name": name or "simulated"}))

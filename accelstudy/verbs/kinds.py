@@ -200,9 +200,6 @@ EffectName = Annotated[str, EFFECTS]
 NoiseEffectName = Annotated[
     str, Names("noise_effect", "accelstudy.noise_effects", "noise_effect_names")
 ]
-GrossErrorName = Annotated[
-    str, Names("gross_error", "accelstudy.campaign.gross_errors", "gross_error_names")
-]
 SchemeName = Annotated[str, Names("scheme", "accelstudy.schemes", "scheme_names", True)]
 SensorName = Annotated[str, Names("sensor", "accelstudy.data_sheets", "data_sheet_names", True)]
 _BY = "Calibrate by gravity alone, or with the angles of a robot, too."

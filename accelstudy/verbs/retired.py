@@ -25,7 +25,10 @@ KEYWORDS = {
         "prior": "`after` takes a scheme that was measured; a prior is for `advise`",
         "mountings": "`attitudes` takes a scheme, as a file of the attitudes that a mount allows",
     },
-    "init": {"sensor": "set `noise` and `sensor` in config/config.yaml of the new folder"},
+    "init": {
+        "sensor": "set `noise` and `sensor` in config/config.yaml of the new folder",
+        "template": "it sets up a study; `accelstudy batch` and the others need no folder",
+    },
     "plan": {
         "reference": "`accelstudy import --reference-log` takes a calibrated sensor",
         "robot_accuracy": "`robot_sigma` takes it",
@@ -33,7 +36,9 @@ KEYWORDS = {
     },
     "simulate": {"robot_accuracy": "`robot_sigma` takes it"},
     "simulate_campaign": {
-        "gross": "`gross_errors` takes it",
+        **dict.fromkeys(
+            ("gross", "gross_error", "gross_errors"), "change the rows of positions.csv"
+        ),
         "hold": "campaigns have no slopes within holds",
         "no_time": "`interval` is none then",
         "robot_sigma_mgon": "`robot_sigma` takes it with its unit, as 5mgon",

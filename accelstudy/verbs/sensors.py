@@ -16,7 +16,7 @@ from accelstudy.verbs import kinds
 from accelstudy.verbs.kinds import verb
 
 if TYPE_CHECKING:
-    from accelstudy import Calibration, Campaign, Comparison, History, Lot
+    from accelstudy import Batch, Calibration, Campaign, Comparison, History, Lot
 
 
 @verb
@@ -162,6 +162,42 @@ def lot(
     check_once(given, "sensor")
     measured = [as_campaign(one) for one in given]
     return Lot.of(measured, *chosen(model, approach), seed, cores)
+
+
+@verb
+def batch(
+    campaigns: Sequence[Campaign | str | PathLike[str]],
+    *,
+    model: kinds.ModelName = "bias-scale-nonorthogonality",
+    approach: kinds.UsualApproach = None,
+) -> Batch:
+    """Calibrate many campaigns, each by itself.
+
+    What cannot be calibrated is named, and stops no other.
+
+    The folder of results gets report.html with an overview, a table of the campaigns and one of
+    their parameters, and in each/NAME what `accelstudy calibrate` writes of a campaign.
+
+    Parameters
+    ----------
+    campaigns : sequence of Campaign or path
+        Folders of campaigns, or patterns such as 'campaigns/*'.
+
+    Raises
+    ------
+    InputError
+        If two campaigns have the same name, or a name is unknown.
+
+    Examples
+    --------
+        accelstudy batch sensor-1 sensor-2 --out batch
+    """
+    from accelstudy.campaign.batch import Batch
+    from accelstudy.verbs.inputs import chosen
+
+    given = [folder for one in as_sequence(campaigns) for folder in folders_of(one)]
+    check_once(given, "campaign")
+    return Batch(given, *chosen(model, approach))
 
 
 def folders_of(given: Campaign | str | PathLike[str]) -> list[Campaign | str | PathLike[str]]:

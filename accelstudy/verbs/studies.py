@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from os import PathLike
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Any
 
 from accelstudy.verbs import kinds
 from accelstudy.verbs.kinds import verb
@@ -132,9 +132,6 @@ def scheme(name: kinds.SchemeName) -> pd.DataFrame:
 def init(
     folder: str | PathLike[str],
     *,
-    template: Annotated[
-        str, kinds.Names("template", "accelstudy.study.new_study", "TEMPLATES")
-    ] = "study",
     force: kinds.Force = False,
 ) -> str:
     """Set up a study of your own in a new folder.
@@ -146,8 +143,6 @@ def init(
     ----------
     folder : path
         The new folder.
-    template : str
-        What to set up: study, or campaigns for a batch of campaigns.
 
     Returns
     -------
@@ -160,18 +155,12 @@ def init(
     """
     from importlib.util import find_spec
 
-    from accelstudy.basics.errors import InputError, UnknownNameError, key
-    from accelstudy.study.new_study import RETIRED, TEMPLATES, new_study
+    from accelstudy.study.new_study import new_study
 
-    if template in RETIRED:
-        name = f"{key('template')} {template}"
-        raise InputError(f"{name}: no longer a template; {RETIRED[template]}")
-    if template not in TEMPLATES:
-        raise UnknownNameError("template", template, TEMPLATES)
     place = Path(folder)
-    results = place / "results" / new_study(place, template, force)
+    results = place / "results" / new_study(place, force)
     lines = [
-        f"{template}: {place}",
+        f"study: {place}",
         f"Edit {place / 'config' / 'config.yaml'}; then, in {place}: snakemake --cores 2",
         f"Results will be in {results}.",
     ]

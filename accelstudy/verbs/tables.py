@@ -18,7 +18,6 @@ from accelstudy.basics.plugins import source_of
 from accelstudy.basics.progress import stage, track
 from accelstudy.basics.registry import WithSettings
 from accelstudy.basics.units import angle_note, attitude_unit, to_attitude
-from accelstudy.campaign.gross_errors import get_gross_error, gross_error_names
 from accelstudy.data_sheets.reading import data_sheet_names, get_data_sheet
 from accelstudy.data_sheets.sheet import QUANTITIES
 from accelstudy.design.estimability import estimability
@@ -42,7 +41,7 @@ def catalogue(kind: str) -> pd.DataFrame:
     Parameters
     ----------
     kind : str
-        "effects", "noise effects", "gross errors", "models", "schemes", "approaches" or
+        "effects", "noise effects", "models", "schemes", "approaches" or
         "data sheets".
     """
     if kind not in KINDS:
@@ -78,9 +77,7 @@ def _noise_effect(effect: NoiseEffect) -> Row:
 def _item(item: WithSettings, equation: str) -> Row:
     """Columns of what has settings: its formula, and the settings as specs have them."""
     settings = [
-        f"{one.name} drawn"
-        if math.isnan(value)
-        else f"{one.name}={plain_number(value)}{'' if one.unit == '1' else f' {one.unit}'}"
+        f"{one.name}={plain_number(value)}{'' if one.unit == '1' else f' {one.unit}'}"
         for one, value in zip(item.takes, item.settings.values(), strict=True)
     ]
     return {
@@ -100,9 +97,6 @@ def plain_number(value: float) -> str:
 KINDS: dict[str, Callable[[], list[Row]]] = {
     "effects": lambda: [_effect(get_effect(name)) for name in effect_names()],
     "noise effects": lambda: [_noise_effect(get_noise_effect(n)) for n in noise_effect_names()],
-    "gross errors": lambda: [
-        _item(error, error.equation) for error in map(get_gross_error, gross_error_names())
-    ],
     "models": lambda: [
         {"name": name, "n_parameters": m.n_parameters, "parameters": ", ".join(m.parameter_names)}
         for name, m in ((name, get_model(name)) for name in MODELS)

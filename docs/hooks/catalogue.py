@@ -9,7 +9,6 @@ from markdown_text import code, page, plain, table
 import accelstudy
 from accelstudy.approaches import approach_names, get_approach
 from accelstudy.basics.units import display_unit, to_attitude, to_display, unit_label
-from accelstudy.campaign.gross_errors import get_gross_error, gross_error_names
 from accelstudy.campaign.importing.public import public_data
 from accelstudy.data_sheets import data_sheet_names, get_data_sheet
 from accelstudy.data_sheets.sheet import QUANTITIES
@@ -89,7 +88,6 @@ EFFECTS = accelstudy.catalogue("effects").sort_values("part", ascending=False, k
 KINDS = {
     "effects": (get_effect, lambda: EFFECTS.index, _of_effect),
     "noise effects": (get_noise_effect, noise_effect_names, _of_noise_effect),
-    "gross errors": (get_gross_error, gross_error_names, lambda e: {"Data": _equation(e)}),
     "approaches": (get_approach, approach_names, _of_approach),
 }
 

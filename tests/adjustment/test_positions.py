@@ -6,6 +6,7 @@ from functools import partial
 
 import numpy as np
 import pytest
+from gross import bumped
 from quality_helpers import draw
 from stand_ins import composed
 from usual import BOTH, GRAVITY, NINE, ROBOT
@@ -131,9 +132,7 @@ def test_memory_of_the_quality_is_linear_in_the_positions(approach):
 
 
 def test_a_page_of_many_positions_lists_those_that_fit_worst(tmp_path):
-    campaign = acs.simulate_campaign(
-        seed=3, scheme="fibonacci-1200", gross_errors=("outlier_position(position=77)",)
-    )
+    campaign = bumped(acs.simulate_campaign(seed=3, scheme="fibonacci-1200"), 77)
     fit = fit_campaign(campaign, NINE, ROBOT)
     with composed("residuals"):
         Calibration(fit).write(tmp_path, tmp_path)

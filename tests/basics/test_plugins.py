@@ -203,10 +203,9 @@ def test_a_model_in_a_file_names_it_and_loads_nothing(named):
     assert get_model("model.yaml").effects[1].name == "ripple"
 
 
-@pytest.mark.parametrize("template", ["study", "campaigns"])
-def test_a_new_study_names_those_it_was_set_up_with(template):
+def test_a_new_study_names_those_it_was_set_up_with():
     with forgotten():
-        succeed("--plugin", "ripple.py", "init", "new", "--template", template)
+        succeed("--plugin", "ripple.py", "init", "new")
     content = yaml.safe_load(Path("new/config/config.yaml").read_text(encoding="utf-8"))
     plugins.load_plugins(content)
     assert plugins.loaded_files() == [str(Path("ripple.py").resolve())]

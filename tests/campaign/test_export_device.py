@@ -107,7 +107,9 @@ class Library:
         self.names, self.columns, texts = {}, {}, []
         for i, (key, calibration) in enumerate(calibrations.items()):
             name = self.names[key] = f"some{i}"
-            header = c_header(calibration).replace("ACCEL_CALIBRATION_H", f"{name}_H")
+            header = c_header(calibration, "double" if double else "float").replace(
+                "ACCEL_CALIBRATION_H", f"{name}_H"
+            )
             texts.append(re.sub(r"\baccel_(\w+)", rf"{name}_\1", header))
             signature = re.search(rf"{name}_calibrate\(([^)]*)\)", texts[-1].split("*/", 1)[1])[1]
             self.columns[key] = [part.split()[-1] for part in signature.split(",")[1:-1]]
@@ -122,7 +124,7 @@ class Library:
         source.write_text("\n".join(texts), encoding="utf-8")
         warnings = ["-std=c99", "-pedantic", "-Wall", "-Wextra", "-Werror", "-Wdouble-promotion"]
         command = ["cc", *warnings, "-shared", "-fPIC", "-o", library, source, "-lm"]
-        subprocess.run([*command, *(["-DACCEL_DOUBLE"] if double else [])], check=True)
+        subprocess.run(command, check=True)
         self._library = ctypes.CDLL(str(library))
 
     def __call__(self, key, readings, known):

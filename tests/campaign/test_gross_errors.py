@@ -1,20 +1,22 @@
-"""Gross errors: what each does to a campaign, how it is undone, and what is refused."""
+"""Gross errors: what is recognised, how it is undone, and what is refused."""
 
 import re
 from dataclasses import replace
 
+import gross
 import numpy as np
 import pytest
-from calling import refused
 
 import accelstudy as acs
 from accelstudy.basics.errors import InputError
 from accelstudy.basics.units import STANDARD_GRAVITY
 from accelstudy.campaign.calibration.fit import fit_campaign
 from accelstudy.campaign.format import read_campaign, write_campaign
-from accelstudy.campaign.gross_errors import get_gross_error, gross_error_names
-from accelstudy.campaign.gross_errors.errors import SIGNED_PERMUTATIONS
-from accelstudy.campaign.gross_errors.recognition import recognise
+from accelstudy.campaign.gross_errors.recognition import (
+    GROSS_ERRORS,
+    SIGNED_PERMUTATIONS,
+    recognise,
+)
 from accelstudy.campaign.session import Campaign
 from accelstudy.diagnosis.pipeline import diagnose
 from accelstudy.leveling.angles import angles_of
@@ -27,105 +29,25 @@ BLIND = replace(CLEAN, angles=None, sigma_angle=None, yaw=None)
 GRAVITY_20 = acs.simulate_campaign(scheme="fibonacci-20", approach="gravity")
 
 
-def spoiled(spec, seed=1, campaign=CLEAN):
-    return get_gross_error(spec).apply(campaign, np.random.default_rng(seed))
+# --- what is refused -----------------------------------------------------------------------------
 
 
-def drawn(spec, seed, campaign=CLEAN):
-    return get_gross_error(spec).draw(campaign, np.random.default_rng(seed))
-
-
-@pytest.mark.parametrize("name", gross_error_names())
-def test_what_is_drawn_is_told_and_can_be_given(name):
-    error = drawn(name, 3)
-    again = get_gross_error(error.spec).apply(CLEAN, np.random.default_rng(99))
-    np.testing.assert_allclose(again.forces, spoiled(name, 3).forces, rtol=0, atol=1e-9)
-    np.testing.assert_allclose(again.angles, spoiled(name, 3).angles, rtol=0, atol=1e-9)
-    assert len({drawn(name, seed).spec for seed in range(20)}) > 2
-    assert np.any(again.forces != CLEAN.forces) or np.any(again.angles != CLEAN.angles)
-
-
-ORDER = [0, 4, 2, 3, 1, *range(5, 24)]
-ACTS = {
-    "outlier_position(position=7, y=0.3)": lambda c: {
-        "forces": c.forces + 0.3 * np.outer(np.arange(24) == 6, [0, 1, 0])
-    },
-    "row_order(first=2, second=5)": lambda c: {"forces": c.forces[ORDER], "sd": c.sd[ORDER]},
-    "axis_error(x=2, y=-1, z=3)": lambda c: {
-        "forces": c.forces[:, [1, 0, 2]] * [1, -1, 1], "sd": c.sd[:, [1, 0, 2]]
-    },
-    "unit_error(force=0.101971621297793)": lambda c: {
-        "forces": c.forces / STANDARD_GRAVITY, "sd": c.sd / STANDARD_GRAVITY
-    },
-    "unit_error(angle=0.9)": lambda c: {"angles": np.deg2rad(0.9 * np.rad2deg(c.angles))},
-    "unit_error(angle=0.015707963267949)": lambda c: {"angles": np.pi / 200 * c.angles},
-}  # fmt: skip
-"""What each changes; all else stays."""
-
-
-@pytest.mark.parametrize("spec", ACTS)
-def test_what_each_does(spec):
-    changed, campaign = ACTS[spec](CLEAN), spoiled(spec)
-    for name in ("forces", "sd", "angles", "time"):
-        expected = changed.get(name, getattr(CLEAN, name))
-        np.testing.assert_allclose(getattr(campaign, name), expected, rtol=1e-12, atol=1e-14)
-
-
-def test_what_is_drawn():
-    e = spoiled("outlier_position").forces - CLEAN.forces
-    assert np.count_nonzero(e.any(axis=1)) == 1
-    assert np.linalg.norm(e) == pytest.approx(0.1)
-    assert len(set(SIGNED_PERMUTATIONS)) == 48
-    assert SIGNED_PERMUTATIONS[0] == (1, 2, 3)
-    assert all(drawn("axis_error", seed).spec != "axis_error(x=1, y=2, z=3)" for seed in range(99))
-
-
-def test_exchanged_rows_are_in_different_attitudes():
-    campaign = acs.simulate_campaign(scheme="faces-6", repeats=4)
-    for seed in range(30):
-        changed = spoiled("row_order", seed, campaign).forces - campaign.forces
-        assert np.abs(changed).max() > 1
-
-
-def test_unit_errors_that_are_drawn_are_those_that_plausibility_checks_know(tmp_path):
-    specs = {drawn("unit_error", seed).spec for seed in range(40)}
-    assert len(specs) == 3
-    for spec in specs:
-        with pytest.raises(InputError, match=r"look like|, not in gon"):
-            write_campaign(spoiled(spec), tmp_path / "refused")
-        write_campaign(spoiled(spec), tmp_path / "written", plausible=False)
-        with pytest.raises(InputError, match=r"look like|, not in gon"):
-            read_campaign(tmp_path / "written")
+@pytest.mark.parametrize("wrong", [{"force": 1 / STANDARD_GRAVITY}, {"angle": 0.9},
+                                   {"angle": np.pi / 200}])  # fmt: skip
+def test_usual_wrong_units_are_refused(wrong, tmp_path):
+    spoiled = gross.unit(CLEAN, **wrong)
+    with pytest.raises(InputError, match=r"look like|, not in gon"):
+        write_campaign(spoiled, tmp_path / "refused")
+    write_campaign(spoiled, tmp_path / "written", plausible=False)
+    with pytest.raises(InputError, match=r"look like|, not in gon"):
+        read_campaign(tmp_path / "written")
     assert not (tmp_path / "refused").exists()
-    assert {drawn("unit_error", seed, BLIND).spec for seed in range(20)} == {
-        "unit_error(force=0.101971621298)"
-    }
 
 
 def test_other_checks_stay_without_plausibility(tmp_path):
     broken = replace(CLEAN, forces=np.where(np.arange(3) == 1, np.nan, CLEAN.forces))
     with pytest.raises(InputError, match="fy: position 1: nan is not finite"):
         write_campaign(broken, tmp_path, plausible=False)
-
-
-@pytest.mark.parametrize(("spec", "expected"), [
-    ("axis_eror", "unknown gross error 'axis_eror'; did you mean 'axis_error'?"),
-    ("axis_error(x=1, y=1, z=3)", "must be 1, 2, 3 in some order, each with a sign"),
-    ("outlier_position(position=25)", "position=25 is no position of simulated; they are 1 to"),
-    ("row_order(first=2)", "give first and second, or neither"),
-    ("unit_error(force=0)", "force=0 must be a number above 0"),
-])  # fmt: skip
-def test_what_is_wrong(spec, expected):
-    with refused(expected):
-        spoiled(spec)
-
-
-def test_no_angles_no_unit_of_angles():
-    with pytest.raises(InputError, match="simulated has no angles"):
-        spoiled("unit_error(angle=0.9)", campaign=BLIND)
-    level = replace(CLEAN, forces=np.tile(CLEAN.forces[0], (24, 1)))
-    with pytest.raises(InputError, match="all positions are in the same attitude"):
-        spoiled("row_order", campaign=level)
 
 
 # --- recognition ---------------------------------------------------------------------------------
@@ -165,17 +87,17 @@ def test_nothing_is_recognised_where_nothing_is_wrong(design, designs):
 def test_all_axes_and_units_are_recognised_and_undone(design, designs):
     right = designs[design]
     some = SIGNED_PERMUTATIONS[1 :: 1 if design == "plain" else 5]
-    wrong = [f"axis_error(x={x}, y={y}, z={z})" for x, y, z in some]
-    wrong += [
-        f"unit_error(force={factor})" for factor in (0.1019716212978, 101.9716212978, 9.80665)
-    ]
-    wrong += [f"unit_error(angle={factor})" for factor in (0.9, 0.015707963267949)]
-    for spec in wrong:
-        found = recognise(spoiled(spec, campaign=right))
-        assert found is not None, spec
-        assert found.name == spec.partition("(")[0], spec
-        np.testing.assert_allclose(found.corrected.forces, right.forces, rtol=1e-9, err_msg=spec)
-        np.testing.assert_allclose(found.corrected.angles, right.angles, rtol=1e-9, err_msg=spec)
+    wrong = [("axis_error", shown, gross.axes(right, *shown)) for shown in some]
+    for force in (0.1019716212978, 101.9716212978, 9.80665):
+        wrong.append(("unit_error", force, gross.unit(right, force=force)))
+    for angle in (0.9, 0.015707963267949):
+        wrong.append(("unit_error", angle, gross.unit(right, angle=angle)))
+    for name, setting, spoiled in wrong:
+        found, said = recognise(spoiled), f"{name} {setting}"
+        assert found is not None, said
+        assert found.name == name, said
+        np.testing.assert_allclose(found.corrected.forces, right.forces, rtol=1e-9, err_msg=said)
+        np.testing.assert_allclose(found.corrected.angles, right.angles, rtol=1e-9, err_msg=said)
 
 
 @pytest.mark.parametrize("design", DESIGNS)
@@ -236,8 +158,8 @@ def test_what_does_not_show_is_not_recognised(designs):
     repeated = designs["repeated"]
     alike = np.argsort(np.linalg.norm(repeated.forces - repeated.forces[0], axis=1))[:2]
     assert recognise(exchanged(repeated, alike, alike[::-1])) is None
-    for spec in ("axis_error(x=-3, y=1, z=2)", "row_order(first=2, second=9)"):
-        assert recognise(spoiled(spec, campaign=BLIND), attitude=False) is None
+    for spoiled in (gross.axes(BLIND, -3, 1, 2), gross.rows(BLIND, 2, 9)):
+        assert recognise(spoiled, attitude=False) is None
 
 
 def test_a_sensor_that_is_mounted_in_its_own_way_is_no_gross_error(designs):
@@ -253,10 +175,9 @@ def test_several_gross_errors_are_undone_together(designs):
     right = designs["many"]
     wrong = exchanged(right, [4, 9], [9, 4])
     wrong.forces[20] += (3, -12, 8)
-    for spec in ("axis_error(x=2, y=-1, z=3)", "unit_error(force=0.1019716212978)"):
-        wrong = spoiled(spec, campaign=wrong)
+    wrong = gross.unit(gross.axes(wrong, 2, -1, 3), force=0.1019716212978)
     found = recognise(wrong)
-    assert {name for name, _ in found.names} == set(gross_error_names())
+    assert {name for name, _ in found.names} == {*GROSS_ERRORS}
     assert ("outlier_position", 21) in found.names
     assert found.reasons["unit_error"] == "the forces are in g"
     assert found.reason.count(";") == len(found.reasons) - 1

@@ -64,7 +64,6 @@ def test_the_shell_completes_commands_and_names():
     assert completed(["scheme", "mcl"]) == ["mclaren-24"]
     assert completed(["simulate-campaign", "--effect", "warm"]) == ["warm_up"]
     assert completed(["simulate-campaign", "--noise-effect", "heavy"]) == ["heavy_tails"]
-    assert completed(["simulate-campaign", "--gross-error", "row"]) == ["row_order"]
 
 
 def test_help_imports_nothing_that_takes_long():

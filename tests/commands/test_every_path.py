@@ -5,11 +5,12 @@ What is registered is taken from the registries, so that something new is covere
 
 import json
 
+import gross
 import pytest
 from calling import call
 from page_helpers import assert_sound, text_of
 
-from accelstudy.campaign.gross_errors import gross_error_names
+from accelstudy.campaign.format import read_campaign, write_campaign
 from accelstudy.effects import effect_names, get_effect
 from accelstudy.noise_effects import noise_effect_names
 from accelstudy.sensors.models import get_model
@@ -22,18 +23,25 @@ FAMILIES = {get_effect(name).family or name: name for name in effect_names() if 
 ADDED = [
     *(("--effect", name) for name in FAMILIES.values()),
     *(("--noise-effect", name) for name in noise_effect_names()),
-    *(("--gross-error", name) for name in gross_error_names()),
 ]
 CASES = {
     "nothing": (),
     "nothing-unknown-sigma": ("--no-sigma-known",),
     "sigma-too-small": ("--noise-effect", "noise_level(kappa=6)"),
-    "fx-fy": ("--scheme", "fibonacci-30", "--gross-error", "axis_error(x=2, y=1, z=3)"),
+    "fx-fy": ("--scheme", "fibonacci-30"),
     **{name: (option, name) for option, name in ADDED},
     "slip-without-time": ("--interval", "none", "--effect", "mounting_slip(t=12.5)"),
-    "gravity-outlier": ("--approach", "gravity", "--gross-error", "outlier_position"),
+    **dict.fromkeys(("rows", "unit", "outlier"), ()),
+    "gravity-outlier": ("--approach", "gravity"),
     "gravity-few": ("--approach", "gravity", "--scheme", "fibonacci-10"),
 }  # fmt: skip
+GROSS = {
+    "fx-fy": lambda campaign: gross.axes(campaign, 2, 1, 3),
+    "rows": lambda campaign: gross.rows(campaign, 3, 9),
+    "unit": lambda campaign: gross.unit(campaign, force=0.102),
+    **dict.fromkeys(("outlier", "gravity-outlier"), lambda campaign: gross.bumped(campaign, 7)),
+}
+"""What is wrong with the data."""
 SAID = {"fx-fy": "axes are swapped: x is read as y, y is read as x"}
 FIGURES = {
     **dict.fromkeys(CASES.keys() - {name for _, name in ADDED}, "composed"),
@@ -64,8 +72,10 @@ def test_three_commands_end_well_and_agree(case, tmp_path, request):
     run("simulate-campaign", "--out", campaign, *scheme, *HOLDS, *options)
     approach = "gravity" if "gravity" in options else "robot"
     with_approach = ("--approach", approach)
-    gross = "--gross-error" in options
-    told = run("calibrate", campaign, *with_approach, "--out", tmp_path / "cal", fails=gross)
+    if case in GROSS:
+        write_campaign(GROSS[case](read_campaign(campaign)), campaign, plausible=False)
+    fails = case in GROSS
+    told = run("calibrate", campaign, *with_approach, "--out", tmp_path / "cal", fails=fails)
     calibration = None
     if told.exit_code:  # a unit that is not read, or no solution
         assert told.stderr.count("\n") == 1
@@ -97,11 +107,11 @@ def _assert_agree(calibration, diagnosis):
     """What one command says, the other does not contradict."""
     state, verdict = calibration["state"], diagnosis["verdict"]
     names = {effect["name"] for effect in diagnosis["effects"]}
-    gross = calibration["gross_error"]
-    if gross is not None:
+    error = calibration["gross_error"]
+    if error is not None:
         assert state == "implausible"
         assert verdict == "gross_error"
-        assert gross["name"] in names
+        assert error["name"] in names
         return  # the diagnosis goes on with mended data
     assert not names & {"unit_error", "axis_error", "row_order"}
     test = calibration["global_test"]

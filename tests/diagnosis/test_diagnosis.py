@@ -61,7 +61,8 @@ has all of the catalogue, pairs and triples of them, and each kind of noise and 
 
 @pytest.mark.parametrize("effect", HIDDEN)
 def test_a_large_effect_is_named_confirmed_and_placed_where_its_formula_has_it(effect):
-    measured, truth = campaign(11, scheme="fibonacci-36", effects=(effect,))
+    measured = campaign(11, scheme="fibonacci-36", effects=(effect,))
+    truth = measured.truth
     found = diagnose(measured, NINE)
     assert found.verdict == "named"
     (named,) = found.found
@@ -84,14 +85,14 @@ def test_a_large_effect_is_named_confirmed_and_placed_where_its_formula_has_it(e
 
 
 def test_noise_lives_nowhere():
-    assert diagnose(campaign(11)[0], NINE).like == ()
+    assert diagnose(campaign(11), NINE).like == ()
 
 
 @pytest.mark.parametrize(("tau", "seed"), [(100, 0), (1200, 2)])
 def test_a_warm_up_far_above_the_noise_needs_no_second_effect(tau, seed):
     """However large it is, and though no time constant of the grid fits it."""
     keys = {"effects": (f"warm_up(tau={tau}): 0.1, -0.15, 0.2",), "temperature_order": "linear"}
-    (found,) = diagnose(campaign(seed, **keys)[0], NINE).found
+    (found,) = diagnose(campaign(seed, **keys), NINE).found
     assert found.name == "warm_up"
     assert float(found.spec.split("=")[1].rstrip(")")) == pytest.approx(tau, rel=0.1)
 
@@ -110,7 +111,8 @@ def test_hard_clipping_has_its_name_or_none():
 @pytest.mark.parametrize("approach", ["robot", "gravity"])
 def test_the_other_parameters_are_right_with_the_effect(approach):
     """Far more than the noise does, so that the truth is only found with the effect."""
-    measured, truth = campaign(11, effects=("hysteresis",), size=3, approach=approach)
+    measured = campaign(11, effects=("hysteresis",), size=3, approach=approach)
+    truth = measured.truth
     found = diagnose(measured, NINE)
     true = [p["value"] for effect in truth["sensor"] for p in effect["parameters"]]
     sigma = np.sqrt(np.diag(found.final.solution.cofactors)[:9])

@@ -107,7 +107,7 @@ def test_the_limit_of_a_parameter_holds_where_no_noise_is_stated():
 
 
 def test_a_sensor_whose_range_is_far_beyond_gravity_does_not_saturate():
-    measured, _ = campaign(3)
+    measured = campaign(3)
     assert "saturation" in examine_campaign(measured, NINE).candidates
     wide = examine_campaign(replace(measured, full_range=8 * G), NINE)
     assert wide.invisible == ("gravity_error", "saturation")

@@ -78,7 +78,7 @@ def test_a_diagnosis_decides_at_the_levels(known, level):
     What has no name counts at the level of a calibration that accepts the fit, and both say the
     same of it; without a stated sigma, a calibration cannot accept any.
     """
-    measured = campaign(1, scheme="mclaren-24", sigma_known=known)[0]
+    measured = campaign(1, scheme="mclaren-24", sigma_known=known)
     says = calibrated_lines(assess(fit_campaign(measured, NINE, ROBOT)))
     case = diagnose(measured, NINE).case
     for p, verdict, weak in (

@@ -110,7 +110,7 @@ def test_beside_an_effect_a_shape_is_what_the_effect_leaves(shapes):
 
 
 def test_coordinates_are_those_of_the_campaign():
-    measured, _ = campaign()
+    measured = campaign()
     frame = examine_campaign(measured, NINE).frame
     for name, expected in {
         "time": measured.time,

@@ -7,7 +7,7 @@ accelstudy check-sigmas my-campaign --quiet --replicates 50
 accelstudy data-sheet my-campaign --quiet --out sheet.yaml
 accelstudy simulate-campaign --quiet --out rejected --effect quadratic_scale --size 5
 accelstudy simulate-campaign --quiet --out unknown --no-sigma-known
-accelstudy simulate-campaign --quiet --out implausible --gross-error "row_order(first=3, second=4)"
+accelstudy simulate-campaign --quiet --out implausible --effect "bias: 20, 0, 0"
 accelstudy calibrate rejected --quiet --approach robot --out rejected-calibrated
 accelstudy calibrate unknown --quiet --approach robot --out unknown-calibrated
 accelstudy calibrate implausible --quiet --approach robot --out implausible-calibrated

@@ -19,7 +19,7 @@ from places import ROOT
 from study_helpers import grid, make_study, run_study
 
 import accelstudy
-from accelstudy.campaign.batch.overview import CAMPAIGN_COLUMNS, PARAMETER_COLUMNS
+from accelstudy.campaign.batch import COLUMNS, PARAMETERS
 from accelstudy.campaign.calibration.document import json_text
 from accelstudy.lots.evidence import SensorEvidence
 from accelstudy.lots.lot import LotDiagnosis
@@ -100,8 +100,8 @@ def test_each_key_and_column_of_a_calibration_is_described(tmp_path):
         "calibration.params": ANY,
         "advice.json": list(advice.content),
         "simulation.json": list(simulation),
-        "campaigns.parquet": list(CAMPAIGN_COLUMNS),
-        "parameters.parquet": list(PARAMETER_COLUMNS),
+        "campaigns.parquet": list(COLUMNS),
+        "parameters.parquet": ["campaign", "parameter", *PARAMETERS],
     }
     page = (ROOT / "docs/reference/file-formats.md").read_text(encoding="utf-8")
     section = page.partition("`simulation.json`")[2].partition("\n## ")[0]

@@ -103,7 +103,7 @@ def test_a_campaign_of_a_composition_has_each_effect_once():
     settings = CampaignSettings(
         model=f"{NINE}+warm_up(tau=300)", effects=("warm_up(tau=500): 0.1, 0.2, 0.3",)
     )
-    _, truth = simulate_campaign(settings)
+    truth = simulate_campaign(settings).truth
     assert [e["name"] for e in truth["sensor"]] == ["bias", "scale", "nonorthogonality"]
     assert [e["name"] for e in truth["effects"]] == ["warm_up"]
     twice = CampaignSettings(effects=("warm_up", "warm_up(tau=3)"))

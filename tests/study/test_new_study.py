@@ -9,7 +9,6 @@ from snakemake_helpers import snakemake
 
 from accelstudy.study.config import read_study
 from accelstudy.study.figures import figure_names
-from accelstudy.study.new_study import TEMPLATES
 
 
 def init(*arguments):
@@ -49,28 +48,23 @@ def test_without_snakemake_one_line_says_what_to_install(tmp_path, monkeypatch):
     assert "pip install 'accelstudy[workflow]'" in line
 
 
-# --- templates -----------------------------------------------------------------------------------
+# --- what it is -----------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize("template", TEMPLATES)
-def test_each_template_is_planned_by_its_workflow_with_all_profiles(template, tmp_path):
-    init(tmp_path / "mine", "--template", template)
+def test_a_new_study_is_planned_by_its_workflow_with_all_profiles(tmp_path):
+    init(tmp_path / "mine")
     profiles = {p.relative_to(ROOT) for p in (ROOT / "profiles").rglob("*.yaml")}
     for profile in profiles:
         text = (ROOT / profile).read_text(encoding="utf-8")
         assert (tmp_path / "mine" / profile).read_text(encoding="utf-8") == text
     planned = snakemake(tmp_path / "mine", "--profile", "profiles/slurm", "--dry-run")
     assert planned.returncode == 0, planned.stdout
-    assert (
-        f"All results of the {'batch' if template == 'campaigns' else template} mine"
-        in planned.stdout
-    )
+    assert "All results of the study mine" in planned.stdout
     assert "snakemake --cores 2 " in (tmp_path / "mine" / "README.md").read_text("utf-8")
 
 
 @pytest.mark.parametrize(("words", "reason"), [
-    (("--template", "plan"), "--template plan: no longer a template; `accelstudy plan` needs"),
-    (("--template", "studio"), "unknown template 'studio'; did you mean 'study'?"),
+    (("--template", "campaigns"), "--template: no longer an option; it sets up a study; `accel"),
     (("--sensor", "adxl355"), "--sensor: no longer an option; set `noise` and `sensor` in config"),
 ])  # fmt: skip
 def test_what_there_is_not_is_one_line(words, reason, tmp_path, monkeypatch):

@@ -274,7 +274,6 @@ def test_results_cannot_be_written(tmp_path, monkeypatch):
 
 @pytest.mark.parametrize(("snakefile", "config"), [
     ("Snakefile", "config/config"),
-    ("workflow/campaigns.smk", "config/campaigns"),
     ("studies/hidden/hidden.smk", "studies/hidden/config/hidden-effects"),
     ("studies/hidden/hidden.smk", "studies/hidden/config/real-noise"),
 ])  # fmt: skip

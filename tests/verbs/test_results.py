@@ -14,6 +14,7 @@ import pandas as pd
 import pytest
 import yaml
 from calling import call, refusal, succeed
+from gross import unit
 from log_helpers import session
 from matplotlib import pyplot
 from matplotlib.figure import Figure
@@ -292,7 +293,7 @@ def test_the_tilt_error_is_that_of_the_report(calibrations):
 
 
 def test_what_reading_refuses_is_diagnosed(tmp_path):
-    given = acs.simulate_campaign(scheme="fibonacci-24", gross_errors="unit_error(force=0.102)")
+    given = unit(acs.simulate_campaign(scheme="fibonacci-24"), force=0.102)
     acs.write_campaign(given, tmp_path, plausible=False)
     with pytest.raises(acs.InputError, match="look like g"):
         acs.read_campaign(tmp_path)
@@ -346,7 +347,7 @@ def test_a_script_of_a_user_takes_six_lines(guide, folder, calibrations, task, m
 
 
 def test_catalogues_are_tables():
-    for kind in ("effects", "noise effects", "gross errors", "models", "schemes", "approaches",
+    for kind in ("effects", "noise effects", "models", "schemes", "approaches",
                  "data sheets"):  # fmt: skip
         table = acs.catalogue(kind)
         assert len(table) > 0

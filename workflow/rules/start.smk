@@ -38,13 +38,8 @@ angle_unit = in_a_line()(attitude_unit)
 
 
 @in_a_line()
-def configured(parse, name, without=None):
-    """The checked configuration, and the folder of the results, which has the name at a key of it.
-
-    `without` is what to say if there is no configuration.
-    """
-    if without and not config:
-        raise InputError(without)
+def configured(parse, name):
+    """The checked configuration, and the folder of the results, which has the name at a key of it."""
     for path in workflow.configfiles:
         read_layer(path)  # Snakemake's own reading is less strict
     checked = parse(config, SOURCE)

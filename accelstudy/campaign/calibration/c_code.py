@@ -52,8 +52,10 @@ LAGGED_TEMPERATURE, SESSION_TIME = "temperature_lagged_", "time_kept"
 of drifts, which end with the session."""
 
 
-def c_header(calibration: SensorCalibration) -> str:
+def c_header(calibration: SensorCalibration, real: str = "float") -> str:
     """Write a header with a function that turns readings into calibrated forces.
+
+    Its numbers are `real`, float or double.
 
     Raises
     ------
@@ -62,7 +64,7 @@ def c_header(calibration: SensorCalibration) -> str:
     """
     calibration.check_device()
     model, p, raw = calibration.model, calibration.parameters, calibration.conversion
-    frame = calibration.usual_layout.axes
+    frame, write = calibration.usual_layout.axes, _Writer(real)
     # Counts lose no digits of a float if their offset is a whole number of them.
     offset = np.broadcast_to(raw.offset, 3)
     whole = np.round(offset)
@@ -72,20 +74,18 @@ def c_header(calibration: SensorCalibration) -> str:
         stages, (k, bias) = [], affine
         k = frame.matrix.T @ k
         output = []
-        force = _affine("force", k @ linear, "reading", whole, k @ (constant - bias))
+        force = write.affine("force", k @ linear, "reading", whole, k @ (constant - bias))
     else:
-        stages, body = _stages(calibration), frame.matrix.T @ model.axes_matrix(p)
-        output = _affine("output", linear, "reading", whole, constant)
-        force = _affine("force", body, "output", np.zeros(3), np.zeros(3))
-    end = calibration.ranges.get("time_s", (0.0, None))[1]
+        stages, body = _stages(calibration, write), frame.matrix.T @ model.axes_matrix(p)
+        output = write.affine("output", linear, "reading", whole, constant)
+        force = write.affine("force", body, "output", np.zeros(3), np.zeros(3))
     return render_text(
         "campaign/calibration/calibration.h.j2",
         version=__version__,
         calibration=calibration,
         sigmas=np.sqrt(np.diag(calibration.covariance)),
         layout=calibration.usual_layout,
-        end=end,
-        end_in_c=None if end is None else _number(end),
+        end=calibration.ranges.get("time_s", (0.0, None))[1],
         bound=MAX_SOLUTION_ERROR,
         bound_mgon=MAX_SOLUTION_ERROR / calibration.gravity / MGON,
         largest=FORCES[-1],
@@ -95,6 +95,8 @@ def c_header(calibration: SensorCalibration) -> str:
         steps=max((stage.steps for stage in stages), default=1),
         output=output,
         force=force,
+        real=real,
+        suffix="f" if real == "float" else "",
     )
 
 
@@ -104,37 +106,40 @@ class _Stage(NamedTuple):
     Attributes
     ----------
     name : str, of the function in C
-    effects : mapping of each effect's spec to its lines of C
-    columns : set of names of what they need besides the force
+    lines : list of str, of C, which evaluate the output and its slope
+    columns : set of names of what the effects need besides the force
     steps : int, Newton steps that solve for the force
     """
 
     name: str
-    effects: Mapping[str, list[str]]
+    lines: list[str]
     columns: set[str]
     steps: int
 
 
-def _stages(calibration: SensorCalibration) -> list[_Stage]:
+def _stages(calibration: SensorCalibration, write: _Writer) -> list[_Stage]:
     """Stages of the output; the first is of the force in the sensitive axes."""
     model, g = calibration.model, calibration.gravity
     sizes = np.concatenate([part * g * evenly_spread(DIRECTIONS) for part in FORCES])
     force, hold = calibration.with_conditions(sizes, model.hold_columns, RANGE_MARGIN)
+    f = symbols(*FORCE)
     stages = []
     for name, last in (("accel_output", False), ("accel_last", True)):
         specs = tuple(effect.spec for effect in model.effects if effect.last == last)
         own = [effect.last == last for effect in model.effects for _ in effect.parameters]
         if specs:
             part, p = compose(model.name, specs), calibration.parameters[own]
-            numbers = {**dict(zip(part.parameter_names, p, strict=True)), "g": g}
-            effects = {spec: _lines(spec, numbers) for spec in specs}
-            columns = {str(symbol) for spec in specs for symbol in _formulas(spec)[0].free_symbols}
-            linear = not any(_formulas(s)[1].free_symbols & {*symbols(*FORCE)} for s in specs)
+            values = zip(symbols(*part.parameter_names, "g"), [*p, g], strict=True)
+            numbers = {symbol: sp.Float(value) for symbol, value in values}
+            added, slopes = zip(*map(_formulas, specs), strict=True)
+            output = (sp.Matrix(f) + sum(added, sp.zeros(3, 1))).xreplace(numbers)
+            slope = (sp.eye(3) + sum(slopes, sp.zeros(3))).xreplace(numbers)
+            entries = {f"slope[{i}][{j}]": slope[i, j] for i in range(3) for j in range(3)}
+            lines = write.assigned(_entries("output", output) | entries)
+            columns = {str(symbol) for symbol in output.free_symbols - {*f}}
             force = part.sense(force, p, g, hold)
-            steps = _steps(part, p, force, g, hold)
-            stages.append(
-                _Stage(name, effects, columns - {*FORCE, *numbers}, 1 if linear else steps)
-            )
+            steps = _steps(part, p, force, g, hold) if slope.free_symbols & {*f} else 1
+            stages.append(_Stage(name, lines, columns, steps))
     return stages
 
 
@@ -168,69 +173,42 @@ def _formulas(spec: str) -> tuple[Any, Any]:
     return added, derivative(added, symbols(*FORCE))
 
 
-def _lines(spec: str, numbers: Mapping[str, float]) -> list[str]:
-    """Write an effect in C: lines that add it to an output and its slope."""
-    added, slope = _formulas(spec)
-    used = {str(symbol) for symbol in added.free_symbols}
-    values = _entries("output", added)
-    values |= {f"slope[{i}][{j}]": slope[i, j] for i in range(3) for j in range(3)}
-    known = {name: _number(value) for name, value in numbers.items()}
-    known |= {name: f"force[{i}]" for i, name in enumerate(FORCE)}
-    return [
-        *(f"const accel_real {name} = {value};" for name, value in known.items() if name in used),
-        *_assigned({name: value for name, value in values.items() if value != 0}, "+="),
-    ]
-
-
-def _affine(name: str, matrix: Array, of: str, offset: Array, constant: Array) -> list[str]:
-    """Write name = matrix (of − offset) + constant, without what is zero."""
-    matrix, offset, constant = (
-        sp.Matrix(3, values.size // 3, [int(v) if v in (-1, 0, 1) else v for v in values.ravel()])
-        for values in (matrix, offset, constant)
-    )
-    vector = sp.Matrix(symbols(*(f"{of}[{i}]" for i in range(3))))
-    return _assigned(_entries(name, matrix * (vector - offset) + constant), "=")
-
-
 def _entries(name: str, vector: Any) -> dict[str, Any]:
     return {f"{name}[{i}]": value for i, value in enumerate(vector)}
 
 
-def _assigned(values: Mapping[str, Any], sign: str) -> list[str]:
-    """Write assignments in C, with common subexpressions calculated once."""
-    shared, results = sp.cse(list(values.values()), list=True)
-    lines = [f"const accel_real {name} = {_c(value)};" for name, value in shared]
-    return lines + [f"{n} {sign} {_c(v)};" for n, v in zip(values, results, strict=True)]
+class _Writer:
+    """Writes assignments in C, in float or double."""
 
+    def __init__(self, real: str) -> None:
+        from sympy.codegen import ast
+        from sympy.codegen.rewriting import create_expand_pow_optimization
+        from sympy.printing.c import C99CodePrinter
 
-def _c(expression: Any) -> str:
-    """Write an expression in C."""
-    fractions = {number: sp.Float(number) for number in expression.atoms(sp.Rational)}
-    fractions = {number: real for number, real in fractions.items() if not number.is_Integer}
-    printer, powers = _printer()
-    return str(printer.doprint(powers(expression.xreplace(fractions))))
+        types = {"float": ast.float32, "double": ast.float64}
+        self._printer = C99CodePrinter({"type_aliases": {ast.real: types[real]}})
+        self._expand = create_expand_pow_optimization(4, base_req=lambda base: True)
+        self._names = {sp.pi: sp.Float(np.pi)} | {
+            symbol: sp.Symbol(f"force[{i}]", real=True) for i, symbol in enumerate(symbols(*FORCE))
+        }
 
+    def assigned(self, values: Mapping[str, Any]) -> list[str]:
+        """Write assignments, with common subexpressions calculated once."""
+        shared, results = sp.cse([v.xreplace(self._names) for v in values.values()], list=True)
+        lines = [f"const accel_real {name} = {self._text(value)};" for name, value in shared]
+        pairs = zip(values, results, strict=True)
+        return lines + [f"{name} = {self._text(value)};" for name, value in pairs]
 
-@cache
-def _printer() -> tuple[Any, Any]:
-    """Printer of what the header makes float or double, and a function: powers as products."""
-    from sympy.codegen.ast import float32, real
-    from sympy.codegen.rewriting import create_expand_pow_optimization
-    from sympy.printing.c import C99CodePrinter
+    def affine(
+        self, name: str, matrix: Array, of: str, offset: Array, constant: Array
+    ) -> list[str]:
+        """Write name = matrix (of − offset) + constant, without what is zero."""
+        matrix, offset, constant = (
+            sp.Matrix(3, each.size // 3, [int(v) if v in (-1, 0, 1) else v for v in each.ravel()])
+            for each in (matrix, offset, constant)
+        )
+        vector = sp.Matrix(symbols(*(f"{of}[{i}]" for i in range(3))))
+        return self.assigned(_entries(name, matrix * (vector - offset) + constant))
 
-    class Printer(C99CodePrinter):  # type: ignore[misc]  # SymPy is untyped
-        _ns = "ACCEL("
-        _prec_funcs = tuple(f"ACCEL({name}" for name in C99CodePrinter._prec_funcs)
-
-        def _print_Float(self, number: Any) -> str:
-            return _number(float(number))
-
-        _print_NumberSymbol = _print_Float
-
-    settings = {"type_aliases": {real: float32}, "type_func_suffixes": {float32: ")"}}
-    return Printer(settings), create_expand_pow_optimization(4, base_req=lambda base: True)
-
-
-def _number(value: float) -> str:
-    digits = f"{value:.12g}"
-    return f"ACCEL({digits if set('.e') & set(digits) else f'{digits}.0'})"
+    def _text(self, expression: Any) -> str:
+        return str(self._printer.doprint(self._expand(expression)))

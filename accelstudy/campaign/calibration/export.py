@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from functools import partial
+
 import numpy as np
 
 from accelstudy.basics.errors import InputError, UnknownNameError
@@ -47,7 +50,12 @@ def matrix_text(calibration: SensorCalibration) -> str:
     return "".join(" ".join(f"{value: .12e}" for value in row) + "\n" for row in rows)
 
 
-WRITERS = {"c": c_header, "matrix": matrix_text, "px4": px4_parameters}
+WRITERS: dict[str, Callable[[SensorCalibration], str]] = {
+    "c": c_header,
+    "c-double": partial(c_header, real="double"),
+    "matrix": matrix_text,
+    "px4": px4_parameters,
+}
 """Forms: a header in C99, plain 3 × 4 numbers, and a file of parameters."""
 
 

@@ -332,10 +332,7 @@ def fit_campaign(
         adjustment = calibrate(model, approach, observed)
     if not adjustment.converged[0]:
         _determined(campaign, model, approach, sigma_to_show_above(campaign))
-        raise InputError(
-            f"{campaign.name}: the adjustment of the model {model.name!r} does not converge; "
-            f"{_cause(campaign, theory, diagnosing)}"
-        )
+        raise InputError(f"{campaign.name}: {_cause(campaign, model, theory, diagnosing)}")
     fit = CampaignFit(campaign, model, approach, observed, adjustment, theory)
     prior = model.prior_weights.any() or observed.common is not None or bool(observed.known)
     if campaign.sigma_force is None and prior and adjustment.redundancy > 0:
@@ -392,21 +389,24 @@ def campaign_estimability(
     )
 
 
-def _cause(campaign: Campaign, theory: Estimability, diagnosing: bool) -> str:
+def _cause(campaign: Campaign, model: SensorModel, theory: Estimability, diagnosing: bool) -> str:
     """Name the probable reason why an adjustment does not converge."""
     gross = recognise(campaign)
     more = "none is recognised here" if diagnosing else "`accelstudy diagnose` looks for more"
-    if diagnosing and gross is not None:
-        return f"beside what was mended this looks wrong ({words(gross.name)}): {gross.reason}"
+    if gross is not None and not diagnosing:
+        what = f"{gross.reason}, and no calibration fits that; {more}"
+        return f"this looks like a gross error ({words(gross.name)}): {what}"
+    lost = f"the adjustment of the model {model.name!r} does not converge; "
     if gross is not None:
-        return f"this looks like a gross error ({words(gross.name)}): {gross.reason}; {more}"
+        what = f"beside what was mended this looks wrong ({words(gross.name)}): {gross.reason}"
+        return lost + what
     if theory.condition > MAX_CONDITION:
         return (
-            f"the {campaign.n_positions} positions hardly determine it (condition "
+            f"{lost}the {campaign.n_positions} positions hardly determine it (condition "
             f"{theory.condition:.0f}, up to {MAX_CONDITION:.0f} is usual); "
             "more attitudes are needed"
         )
-    return f"a gross error in the data or a wrong unit is the usual cause; {more}"
+    return f"{lost}a gross error in the data or a wrong unit is the usual cause; {more}"
 
 
 def initial_values(model: SensorModel, forces: Array, gravity: float) -> Array:

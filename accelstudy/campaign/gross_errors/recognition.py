@@ -1,16 +1,17 @@
 """The judge of plausibility: gross errors are recognised by trying what would mend them.
 
-Even before calibration a real sensor agrees with its robot, or with gravity, within some hundredths
-of g. Data in a wrong unit, with swapped axes or exchanged rows do not. So a sensor is fitted that
-starts at the ideal one and stays near it, and positions that are far off get no weight.
+Data in a wrong unit, with swapped axes or exchanged rows agree with no real sensor, and clearly
+better with one when the error is undone. To recognise one more, name it in `GROSS_ERRORS` and write
+a function that yields its corrections.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Generator, Iterator
+from collections.abc import Callable, Generator, Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
-from functools import cached_property, partial
-from itertools import chain
+from functools import partial
+from itertools import chain, permutations, product
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,40 +19,29 @@ from numpy.typing import NDArray
 from accelstudy.basics.errors import InputError
 from accelstudy.basics.units import ROBOT_UNITS, SENSOR_UNITS, STANDARD_GRAVITY, UNITS
 from accelstudy.basics.wording import comma_list
-from accelstudy.campaign.gross_errors.errors import (
-    SIGNED_PERMUTATIONS,
+from accelstudy.campaign.gross_errors.real_sensor import (
+    MAX_USABLE_ERROR,
+    MIN_POSITION_ERROR,
+    MIN_RATIO,
     Array,
-    angles_times,
-    matrix_of,
-    other_units,
-    permute_axes,
-    reorder_rows,
+    RealSensor,
+    attitude_forces,
 )
 from accelstudy.campaign.session import Campaign
-from accelstudy.leveling.angles import specific_force, usual_norm
+from accelstudy.leveling.angles import usual_norm
 from accelstudy.sensors.conversion import Conversion, conversion_of
 from accelstudy.sensors.plausibility import LARGEST
 
-USUAL_SD = 0.3
-"""Standard deviation of each parameter of an uncalibrated sensor, as a share of gravity."""
-MIN_RATIO = 4.0
-"""How many times better an explanation must fit to be clear. A position that is farther off than so
-many times the usual distance is wrong."""
-MAX_USABLE_ERROR = 0.15
-"""Share of gravity by which no usable sensor is wrong."""
-MIN_POSITION_ERROR = 0.005
-"""Share of gravity by which a single position must be off to be called wrong, and by which an
-exchange of rows must improve the fit."""
-MIN_DISTANCE = 1e-6
-"""Distance, as a share of gravity, below which differences do not count."""
-MIN_SPARE_POSITIONS = 3
-"""Positions beyond the number of fitted parameters that are needed to notice a wrong one."""
-MAX_ITERATIONS = 40
-"""Largest number of iterations."""
+SIGNED_PERMUTATIONS = tuple(
+    tuple(sign * axis for sign, axis in zip(signs, axes, strict=True))
+    for axes in permutations((1, 2, 3))
+    for signs in product((1, -1), repeat=3)
+)
+"""What the channels x, y, z show: axis 1, 2 or 3 with a sign; the first is the right one."""
+GROSS_ERRORS = ("axis_error", "outlier_position", "row_order", "unit_error")
+"""Names of the gross errors that are recognised."""
 MAX_ERRORS = 4
 """Largest number of gross errors of one stage that are looked for in a campaign."""
-MIN_GROSS_ERROR = 0.1
-"""Share of gravity: if no position is farther off, no unit and no axis can be wrong."""
 AS_GOOD = 1.25
 """Two explanations whose distances differ by less than this factor fit equally well; the simpler
 one is taken."""
@@ -463,151 +453,41 @@ def outliers(sensor: RealSensor) -> Iterator[Correction]:
     yield Correction("outlier_position", reason, left, left_out=bumped)
 
 
-# --- How well a real sensor can fit a campaign ----------------------------------------------------
+# --- What undoes them ---------------------------------------------------------------------------
 
 
-@dataclass(frozen=True, eq=False)
-class RealSensor:
-    """A sensor that is fitted robustly to most positions of a campaign.
-
-    Attributes
-    ----------
-    campaign : Campaign
-    attitude : bool, whether to compare with the robot's attitudes, or with gravity alone
-    mounted : bool, whether the sensor may be mounted in any attitude, with errors of any size
-    """
-
-    campaign: Campaign
-    attitude: bool
-    mounted: bool = False
-
-    @property
-    def gravity(self) -> float:
-        """Gravity of the campaign, m/s²."""
-        return self.campaign.gravity
-
-    @cached_property
-    def free(self) -> RealSensor:
-        """The sensor that may be mounted in any attitude."""
-        return replace(self, mounted=True)
-
-    @cached_property
-    def _design(self) -> tuple[Array, Array]:
-        """Design (n, u), and what an ideal sensor lacks, (n, 3) or, of the norm alone, (n, 1)."""
-        g, conditions = self.gravity, _conditions(self.campaign)
-        if self.attitude:
-            ideal = attitude_forces(self.campaign)
-            design = np.stack([*ideal.T / g, np.ones(len(ideal)), *conditions], axis=1)
-            return design, (self.campaign.forces - ideal) / g
-        # The norm of (I + D) f/g + c is 1: linear in the nine numbers of (I + D)ᵀ(I + D), c.
-        x, y, z = unit = self.campaign.forces.T / g
-        columns = [*unit**2, x * y, y * z, z * x, *unit]
-        columns += [c * axis for c in conditions for axis in unit]
-        return np.stack(columns, axis=1), (1 - np.sum(unit**2, axis=0, keepdims=True).T) / 2
-
-    @cached_property
-    def _explained(self) -> Array:
-        """Part of that lack, of the same shape, that the fitted sensor explains."""
-        return _robust(*self._design, np.inf if self.mounted else USUAL_SD)
-
-    @cached_property
-    def expected(self) -> Array | None:
-        """What it reads in each position, (n, 3), m/s²; None where only the norm is known."""
-        if not self.attitude:
-            return None
-        return attitude_forces(self.campaign) + self.gravity * self._explained
-
-    @cached_property
-    def distance(self) -> Array:
-        """Distance of each reading from what it should be, (n,), m/s²."""
-        if self.expected is not None:
-            return np.asarray(np.linalg.norm(self.campaign.forces - self.expected, axis=1))
-        squares = 1 - 2 * (self._design[1] - self._explained)[:, 0]
-        return self.gravity * np.abs(np.sqrt(np.maximum(squares, 0)) - 1)
-
-    @property
-    def tells(self) -> bool:
-        """Whether there are enough positions to say which of them are wrong."""
-        n, u = self._design[0].shape
-        return n >= u + MIN_SPARE_POSITIONS
-
-    @property
-    def usual_distance(self) -> float:
-        """Distance of the usual position, m/s²."""
-        return float(np.median(self.distance))
-
-    @property
-    def misfit(self) -> float:
-        """Mean distance, m/s²; each position counts by `MAX_USABLE_ERROR` at most."""
-        return float(np.mean(np.minimum(self.distance, MAX_USABLE_ERROR * self.gravity)))
-
-    @property
-    def wrong(self) -> NDArray[np.bool_]:
-        """Which positions, (n,), do not fit."""
-        return self.distance > MIN_RATIO * self.usual_distance
-
-    @property
-    def is_far_off(self) -> bool:
-        """Whether a position is so far off that a unit or an axis can be wrong."""
-        return bool(self.distance.max() >= MIN_GROSS_ERROR * self.gravity)
-
-    @property
-    def is_askew(self) -> bool:
-        """Whether most positions fit clearly better if it may be mounted in any attitude."""
-        if not self.attitude or self.usual_distance < MIN_POSITION_ERROR * self.gravity:
-            return False
-        return MIN_RATIO * self.free.usual_distance < self.usual_distance
-
-    @cached_property
-    def is_mirrored(self) -> bool:
-        """Whether its axes are left-handed, as those of no sensor are, however mounted.
-
-        Each axis has to show clearly, or its direction would be one of noise.
-        """
-        if self.expected is None:
-            return False
-        inverse = np.linalg.pinv(self._design[0])
-        matrix = (inverse @ self.expected)[:3] / self.gravity
-        error = self.usual_distance / self.gravity * np.linalg.norm(inverse[:3], ord=2)
-        least = np.linalg.svd(matrix, compute_uv=False)[-1]
-        return bool(np.linalg.det(matrix) < 0 and least > MIN_RATIO * error)
+def _with_readings(campaign: Campaign, change: Callable[[Array], Array]) -> Campaign:
+    """Apply a change to all columns of what the sensor reads, (n, 3) each; sds have no sign."""
+    sd = None if campaign.sd is None else np.abs(change(campaign.sd))
+    return replace(campaign, forces=change(campaign.forces), sd=sd)
 
 
-def attitude_forces(campaign: Campaign) -> Array:
-    """Return what an ideal sensor reads at the robot's angles, (n, 3), m/s²."""
-    assert campaign.angles is not None
-    roll, pitch = campaign.angles.T
-    return np.column_stack(specific_force(roll, pitch, campaign.gravity))
+def matrix_of(shown: Sequence[float]) -> Array:
+    """P of what the channels show: f → P f."""
+    matrix = np.zeros((3, 3))
+    matrix[range(3), np.abs(shown).astype(int) - 1] = np.sign(shown)
+    return matrix
 
 
-def _conditions(campaign: Campaign) -> list[Array]:
-    """Temperature and time, scaled to −1 … 1: a drift with them is not the fault of a position."""
-    conditions = []
-    for values in (campaign.temperature, campaign.time):
-        if values is not None and np.ptp(values) > 0:
-            conditions.append(2 * (values - values.min()) / np.ptp(values) - 1)
-    return conditions
+def permute_axes(campaign: Campaign, matrix: Array) -> Campaign:
+    """Return the campaign with f → P f; columns are reordered, not summed, so no digit changes."""
+    axes = np.argmax(np.abs(matrix), axis=1)
+    return _with_readings(campaign, lambda values: matrix[range(3), axes] * values[:, axes])
 
 
-def _robust(design: Array, lacking: Array, share: float) -> Array:
-    """Fit X p ≈ y robustly and return X p, (n, k); positions that are far off lose their weight.
+def reorder_rows(campaign: Campaign, order: NDArray[np.int_]) -> Campaign:
+    """Return the campaign with the readings in another order."""
+    n_samples = None if campaign.n_samples is None else campaign.n_samples[order]
+    return replace(_with_readings(campaign, lambda values: values[order]), n_samples=n_samples)
 
-    Each parameter is held near zero, as if it had been observed in each position with the standard
-    deviation `share`, where the standard deviation of an observation is the usual distance. So the
-    parameters become large only if the usual distance is large.
-    """
-    n, u = design.shape
-    start: Array = np.zeros((u, lacking.shape[1]))
-    if share == np.inf:
-        start = np.asarray(np.linalg.lstsq(design, lacking, rcond=None)[0])
-    parameters, before = start, np.inf
-    for _ in range(MAX_ITERATIONS):
-        distance = np.linalg.norm(lacking - design @ parameters, axis=1)
-        usual = max(float(np.median(distance)), MIN_DISTANCE)
-        if abs(before - usual) < 1e-3 * usual:
-            break
-        before = usual
-        weights = 1 / (1 + (distance / (MIN_RATIO * usual)) ** 2) ** 2
-        normal = design.T * weights @ design / n + np.eye(u) * max((usual / share) ** 2, 1e-12)
-        parameters = np.linalg.solve(normal, design.T * weights @ lacking / n)
-    return np.asarray(design @ parameters)
+
+def angles_times(campaign: Campaign, factor: float) -> Campaign:
+    """Return the campaign with the robot's angles multiplied by a factor."""
+    columns: dict[str, Any] = {"angles": campaign.angles, "yaw": campaign.yaw}
+    return replace(campaign, **{key: factor * v for key, v in columns.items() if v is not None})
+
+
+def other_units(units: Iterable[str], quantity: str, stated: str) -> dict[str, float]:
+    """Units that could be meant, each with the factor that mends numbers stated in `stated`."""
+    sizes = UNITS[quantity]
+    return {unit: sizes[unit] / sizes[stated] for unit in units if unit != stated}

@@ -16,7 +16,7 @@ from dataclasses import dataclass, replace
 from itertools import combinations, permutations
 from typing import TypeAlias
 
-from accelstudy.campaign.gross_errors import get_gross_error, gross_error_names
+from accelstudy.campaign.gross_errors.recognition import GROSS_ERRORS
 from accelstudy.diagnosis.decision.posterior import Explanation
 from accelstudy.diagnosis.evidence.candidates import UNKNOWN, Cause
 from accelstudy.diagnosis.rules import RULES
@@ -45,7 +45,7 @@ def _family(name: str) -> str:
         return get_effect(name).family
     if name in noise_effect_names():
         return get_noise_effect(name).family
-    return get_gross_error(name).family if name in gross_error_names() else ""
+    return "gross error" if name in GROSS_ERRORS else ""
 
 
 @dataclass(frozen=True)

@@ -1,0 +1,220 @@
+"""A batch: many campaigns, each calibrated by itself, and one overview of all."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Iterator, Mapping, Sequence
+from functools import cached_property
+from os import PathLike
+from pathlib import Path
+from typing import Any
+
+import pandas as pd
+from matplotlib.axes import Axes
+
+from accelstudy.approaches import Approach
+from accelstudy.basics import suggestions
+from accelstudy.basics.errors import InputError
+from accelstudy.basics.levels import (
+    ACCEPTED,
+    BLIND,
+    IMPLAUSIBLE,
+    REFUTATION_LEVEL,
+    REJECTED,
+    UNCHECKED,
+)
+from accelstudy.basics.names import path_name
+from accelstudy.basics.progress import say, show, track, warn
+from accelstudy.basics.units import MGON, display_unit, to_display
+from accelstudy.basics.wording import one_line, plural
+from accelstudy.campaign.calibration.fit import fit_campaign
+from accelstudy.campaign.calibration.result import Calibration
+from accelstudy.campaign.format import read_campaign
+from accelstudy.campaign.session import Campaign
+from accelstudy.files.outputs import BATCH
+from accelstudy.files.parquet import write_frame
+from accelstudy.pages import write_page
+from accelstudy.pages.result import Result
+from accelstudy.sensors.sensor import SensorModel
+
+FAILED = "not calibrated"
+"""State of a campaign that cannot be calibrated."""
+STATES = (FAILED, IMPLAUSIBLE, REJECTED, UNCHECKED, ACCEPTED)
+"""States of campaigns, the worst first, which is that of their batch."""
+EACH = "each"
+"""Folder of the calibrations."""
+COLUMNS = {
+    "campaign": "name",
+    "error": "error",
+    "source": "source",
+    "sensor": "sensor",
+    "model": "model",
+    "approach": "approach",
+    "gravity_mps2": "gravity_mps2",
+    "n_positions": "n_positions",
+    "redundancy": "redundancy",
+    "sigma_priori_mps2": "sigma_position_priori_mps2",
+    "sigma_posteriori_mps2": "sigma_position_posteriori_mps2",
+    "sigma_source": "sigma_source",
+    "p_value": "quality.global_test.p_value",
+    "accepted": "quality.global_test.accepted",
+    "state": "quality.state",
+    "suspects": "suspects",
+    "rms_norm_residual_mps2": "rms_norm_residual_mps2",
+    "held_out_mps2": "quality.held_out.rms_mps2",
+    "held_out_roll_mgon": "quality.held_out.rms_roll_mgon",
+    "held_out_pitch_mgon": "quality.held_out.rms_pitch_mgon",
+    "tilt_roll_mgon": "quality.tilt_rms_mgon.roll",
+    "tilt_pitch_mgon": "quality.tilt_rms_mgon.pitch",
+    "verdict": "quality.verdict",
+    "warnings": "warnings",
+}
+"""Columns of the table of campaigns, and their keys in calibration.json."""
+PARAMETERS = ("value", "sigma", "ci95", "sigma_priori", "sigma_posteriori", "unit")
+"""Columns of the table of parameters, besides campaign and parameter."""
+
+
+class Batch(Result):
+    """Many campaigns, each calibrated by itself; what cannot be calibrated stops no other.
+
+    Attributes
+    ----------
+    calibrations : mapping of names of campaigns to Calibration
+    failed : mapping of names of campaigns to what is wrong
+    sources : mapping of all names to the folders of the campaigns
+    """
+
+    kind = BATCH
+
+    def __init__(
+        self,
+        campaigns: Sequence[Campaign | str | PathLike[str]],
+        model: SensorModel,
+        approach: Approach | None = None,
+    ) -> None:
+        """Calibrate campaigns, or those of folders.
+
+        Raises
+        ------
+        InputError
+            If two campaigns have the same name.
+        """
+        self.name = plural(len(campaigns), "campaign")
+        self.sources: dict[str, str] = {}
+        self.calibrations: dict[str, Calibration] = {}
+        self.failed: dict[str, str] = {}
+        self._chosen = model.name, None if approach is None else approach.name
+        for given in track(campaigns, "campaigns"):
+            if isinstance(given, Campaign):
+                in_memory, source = given, given.name
+            else:
+                in_memory, source = None, os.path.normpath(given)
+            name = path_name(Path(os.path.abspath(source)).name, "campaign")
+            if name in self.sources:
+                raise InputError(f"{self.sources[name]} and {source} are both named {name!r}")
+            self.sources[name] = source
+            try:
+                fit = fit_campaign(in_memory or read_campaign(source), model, approach)
+                self.calibrations[name] = Calibration(fit, source=Path(source))
+            except InputError as error:
+                self.failed[name] = one_line(error).removeprefix(f"{name}: ")
+
+    @cached_property
+    def content(self) -> Mapping[str, Any]:
+        """State, verdict, and what is said of each campaign."""
+        states = [row["state"] for row in self._rows]
+        implausible = states.count(IMPLAUSIBLE)
+        n = len(self.calibrations) - implausible
+        doubt = f", {implausible} implausible" if implausible else ""
+        return {
+            "state": next(state for state in STATES if state in states),
+            "verdict": f"{n} of {len(self.sources)} campaigns calibrated{doubt}",
+            "campaigns": self._rows,
+        }
+
+    @cached_property
+    def _rows(self) -> list[dict[str, Any]]:
+        """The table of campaigns, a mapping for each."""
+        documents = []
+        for name, source in self.sources.items():
+            content: dict[str, Any] = dict(zip(("model", "approach"), self._chosen, strict=True))
+            if name in self.failed:
+                content |= {"error": self.failed[name], "quality": {"state": FAILED}}
+            else:
+                content = dict(self.calibrations[name].content)
+                suspects = (str(each["position"]) for each in content["quality"]["suspects"])
+                content |= {"suspects": ", ".join(suspects)}
+                content |= {"warnings": "\n".join(self.calibrations[name].warnings)}
+            documents.append({**content, "name": name, "source": source})
+        flat = pd.json_normalize(documents).astype(object)
+        flat = flat.where(flat.notna(), None)
+        table = pd.DataFrame({column: flat.get(key) for column, key in COLUMNS.items()})
+        return [{str(k): v for k, v in row.items()} for row in table.to_dict("records")]
+
+    def to_frame(self) -> pd.DataFrame:
+        """Return a row for each campaign, as campaigns.parquet has them."""
+        return pd.DataFrame(self._rows, columns=[*COLUMNS]).convert_dtypes()
+
+    @property
+    def parameters(self) -> pd.DataFrame:
+        """A row for each parameter of each campaign, SI."""
+        rows = [
+            {
+                "campaign": name,
+                "parameter": entry["name"],
+                **{key: entry[key] for key in PARAMETERS},
+            }
+            for name, calibration in self.calibrations.items()
+            for entry in calibration.content["parameters"]
+        ]
+        return pd.DataFrame(rows, columns=["campaign", "parameter", *PARAMETERS])
+
+    def draw(self, ax: Axes) -> None:
+        """Draw the tilt error that each calibration leaves."""
+        table = self.to_frame()
+        for angle in ("roll", "pitch"):
+            shown = to_display(table[f"tilt_{angle}_mgon"].astype(float) * MGON, "rad")
+            ax.plot(range(len(table)), shown, "o", label=angle)
+        ax.set_xticks(range(len(table)), table["campaign"], rotation=90)
+        ax.set(ylabel=f"tilt error left / {display_unit('rad')}", yscale="log")
+        ax.legend()
+
+    def tell(self, place: Path) -> None:
+        """Print what is wrong with campaigns, and how many are calibrated."""
+        for name, error in self.failed.items():
+            warn(f"not calibrated: {name}: {error}")
+        show(self.verdict)
+        say(f"report: {place / 'report.html'}")
+
+    def write(self, folder: Path, place: Path) -> None:
+        """Write two tables, an overview, and what `accelstudy calibrate` does of each campaign."""
+        for name, calibration in self.calibrations.items():
+            (own := folder / EACH / name).mkdir(parents=True)
+            calibration.write(own, place / EACH / name)
+        write_frame(folder / "parameters.parquet", self.parameters)
+        of_state = {state: [r for r in self._rows if r["state"] == state] for state in STATES}
+        calibrated = [r for r in self._rows if r["state"] not in (FAILED, IMPLAUSIBLE)]
+        write_page(
+            folder / "report.html",
+            "campaign/batch.html.j2",
+            self.verdict,
+            verdict=self.verdict,
+            unusable=of_state[FAILED] + of_state[IMPLAUSIBLE],
+            calibrated=calibrated,
+            each=EACH,
+            level=REFUTATION_LEVEL,
+            blind=BLIND,
+            next_steps=[*self._next_steps(place)],
+        )
+        write_frame(folder / "campaigns.parquet", self.to_frame())
+
+    def _next_steps(self, place: Path) -> Iterator[tuple[str, str]]:
+        """What to do with the first good campaign, and with the first doubtful one."""
+        good = [row for row in self._rows if row["state"] in (ACCEPTED, UNCHECKED)]
+        for row in good[:1]:
+            command = suggestions.apply(place / EACH / row["campaign"] / suggestions.HERE)
+            yield "Level a log, for example", command
+        doubtful = [row for row in self._rows if row["state"] in (REJECTED, IMPLAUSIBLE)]
+        for row in doubtful[:1]:
+            command = suggestions.diagnose(row["source"], row["model"], row["approach"])
+            yield "Find what is wrong or missing, for example", command

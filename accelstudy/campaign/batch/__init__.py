@@ -1,1 +1,0 @@
-"""Batches: many campaigns calibrated by one configuration, and their overview."""
