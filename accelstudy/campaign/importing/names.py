@@ -10,48 +10,63 @@ import re
 from collections.abc import Callable, Collection, Mapping, Sequence
 from typing import Any
 
-from accelstudy.campaign.unit_spellings import parse_unit
+from accelstudy.basics.units import CLOCK_UNITS, SENSOR_UNITS
 
-_OF_ROS = r"(_?([a-z0-9]+_)*linear_)?"  # with the topic or the message before, as .csv of a bag has
-_KNOWN = {
-    "fx": rf"f_?x|a_?x|acc?_?x|acc?el_?x|acceler(ation|ometer)x|{_OF_ROS}acceleration_x|x_?axis|x",
-    "fy": rf"f_?y|a_?y|acc?_?y|acc?el_?y|acceler(ation|ometer)y|{_OF_ROS}acceleration_y|y_?axis|y",
-    "fz": rf"f_?z|a_?z|acc?_?z|acc?el_?z|acceler(ation|ometer)z|{_OF_ROS}acceleration_z|z_?axis|z",
+_SPELLINGS = {
+    "m/s^2": "m/s^2 m/s2 m/s/s m/sec^2 ms^-2 ms-2 mps2 mps^2 ms2",
+    "g": "g g0 gn gs",
+    "mg": "mg milli-g millig",
+    "counts": "counts count lsb raw adc digits digit",
+    "s": "s sec secs second seconds",
+    "ms": "ms msec msecs millis millisecond milliseconds",
+    "us": "us usec usecs micros microsecond microseconds",
+    "ns": "ns nsec nsecs nanosecond nanoseconds",
+    "degC": "c degc deg_c celsius",
+    "other": "k degk kelvin f degf deg_f fahrenheit deg degs deg/s dps mdps rad rad/s gon t ut mt "
+    "nt gauss mgauss ugauss pa hpa kpa mbar bar v mv % %rh rh m mm km m/s km/h hz khz min h hours",
+    "": "- 1 none n/a",
+}
+_UNITS = {spelling: unit for unit, words in _SPELLINGS.items() for spelling in words.split()}
+_PLAIN = str.maketrans({"²": "^2", "µ": "u", "μ": "u", "⁻": "-", "·": "", "*": "", ".": ""})
+
+_FORCE = (
+    r"f_?{0}|a_?{0}|acc?_?{0}|acc?el_?{0}|acceler(ation|ometer){0}|{0}_?axis|{0}"
+    # With the topic or the message before, as .csv of a bag has.
+    r"|(_?([a-z0-9]+_)*linear_)?acceleration_{0}"
+)
+_USUAL = {
+    **{f"f{axis}": _FORCE.format(axis) for axis in "xyz"},
+    **{f"sd_f{axis}": rf"sd_?f?{axis}|s_?{axis}|sd_a_?{axis}" for axis in "xyz"},
     "time": r"time|timestamp|seconds",
     "temperature": r"_?(field_)?(temp|temperature)",
     "vibration": r"vibration|vibration_mps2",
     "n_samples": r"n|n_samples|count",
-    "sd_fx": r"sd_?f?x|s_?x|sd_a_?x",
-    "sd_fy": r"sd_?f?y|s_?y|sd_a_?y",
-    "sd_fz": r"sd_?f?z|s_?z|sd_a_?z",
-    "roll": r"roll|roll_robot(_gon)?",
-    "pitch": r"pitch|pitch_robot(_gon)?",
-    "yaw": r"yaw|yaw_robot(_gon)?",
+    **{angle: rf"{angle}|{angle}_robot(_gon)?" for angle in ("roll", "pitch", "yaw")},
 }
 _LESS_USUAL = {
     "time": r"t|(.*_)?secs?|(date|sample|sensor|log)_?time|date|elapsed(_time)?",
     "temperature": r".*(?<![a-z])temp(erature)?s?c?(?![a-z]).*",
 }
 """Names that count where no column has a usual one."""
-_FORCES = {"m/s^2", "g", "mg", "counts"}
 _UNITS_OF: Mapping[str, Collection[str]] = {
-    **dict.fromkeys(("fx", "fy", "fz", "sd_fx", "sd_fy", "sd_fz", "vibration"), _FORCES),
-    "time": {"s", "ms", "us", "ns"},
-    "temperature": {"degC"},
+    **dict.fromkeys((*(k for k in _USUAL if "f" in k), "vibration"), (*SENSOR_UNITS, "counts")),
+    "time": CLOCK_UNITS,
+    "temperature": ("degC",),
 }
 _IN_BRACKETS = re.compile(r"(.*?)[\s_]*[(\[{<]([^()\[\]{}<>]*)[)\]}>]")
 _AS_ENDING = re.compile(r"(.*[^\W_])[\s_]+([^\W_]+([_/^-]\w+)?)")
 
 
-def is_unit(text: str) -> bool:
-    """Whether a cell below a name may be its unit, with or without brackets."""
-    return parse_unit(text.strip().strip("()[]{}<>")) is not None
+def parse_unit(text: str) -> str | None:
+    """Unit by any usual spelling: "m/s^2", "g", …; "other" if unused here, None if it is none."""
+    spelled = text.strip().lower().translate(_PLAIN).replace(" ", "").replace("°", "deg")
+    return _UNITS.get(spelled.replace("℃", "degc"))
 
 
-def with_unit(name: str, unit: str) -> str:
-    """Name with the unit from a row of units."""
-    unit = unit.strip().strip("()[]{}<>")
-    return f"{name} [{unit}]" if parse_unit(unit) and name else name
+def unit_of_cell(text: str) -> str | None:
+    """Unit in a cell below a name, with or without brackets, as it is spelled; None if none is."""
+    unit = text.strip().strip("()[]{}<>")
+    return None if parse_unit(unit) is None else unit
 
 
 def without_unit(name: str) -> str:
@@ -69,12 +84,10 @@ def unit_in(name: str, key: str) -> str | None:
 
 def places_by_name(names: Sequence[str], key: str) -> list[int]:
     """Places of the columns that may be the one of a key: one, if the names tell it."""
-    usual = [re.compile(_KNOWN.get(key, re.escape(key)))]
-    if key in _LESS_USUAL:
-        usual.append(re.compile(_LESS_USUAL[key]))
     found: list[int] = []
-    for pattern in usual:
-        found = [i for i, name in enumerate(names) if _is_of(name, key, pattern.fullmatch)]
+    for pattern in filter(None, (_USUAL.get(key, re.escape(key)), _LESS_USUAL.get(key))):
+        matches = re.compile(pattern).fullmatch
+        found = [i for i, name in enumerate(names) if _is_of(name, key, matches)]
         if len(found) == 1:
             break
     return found

@@ -87,11 +87,11 @@ class Source:
         return [f"{name}.{n}" if n else name for name, n in zip(self.names, before, strict=True)]
 
     def typed_table(self) -> pa.Table:
-        """The table, with numbers as such; only those of a text are not yet."""
-        return self.table
+        """The table, with numbers as such, where those of a text are cells as they stand."""
+        return pa.table(self.columns(range(len(self.names))), names=self.unique_names)
 
     def columns(self, places: Sequence[int]) -> list[pa.ChunkedArray]:
-        """Columns of which only the numbers matter."""
+        """Columns, with numbers as such."""
         return [self.table.column(place) for place in places]
 
     def numbers(self, places: Sequence[int]) -> list[NDArray[Any]]:
@@ -99,9 +99,8 @@ class Source:
 
         A time in ns since 1970 has more digits than a float.
         """
-        left = self.columns(places)
-        # A text takes more memory than its numbers, so it goes as these come.
-        numbers = [self._numbers(left.pop(0), place) for place in places]
+        columns = zip(self.columns(places), places, strict=True)
+        numbers = [self._numbers(column, place) for column, place in columns]
         pa.default_memory_pool().release_unused()
         return numbers
 

@@ -7,7 +7,7 @@ import gzip
 import re
 import zlib
 from collections import Counter
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from contextlib import suppress
 from functools import cached_property
 from io import BytesIO
@@ -15,7 +15,6 @@ from itertools import islice, product, takewhile
 from pathlib import Path
 from typing import Any
 
-import numpy as np
 import pyarrow as pa
 import pyarrow.compute as pc
 from numpy.typing import NDArray
@@ -24,7 +23,7 @@ from pyarrow import csv as arrow_csv
 from accelstudy.basics.errors import InputError, printable
 from accelstudy.basics.progress import stage
 from accelstudy.basics.wording import one_line, plural
-from accelstudy.campaign.importing.names import is_unit, layout_by_names, with_unit
+from accelstudy.campaign.importing.names import layout_by_names, unit_of_cell
 from accelstudy.campaign.importing.sources import Source, is_stamp
 from accelstudy.files.reading import readable
 
@@ -41,6 +40,7 @@ _LABEL = re.compile(rb"(?<![\w.])([A-Za-z_]\w*)[ \t]*[:=][ \t]*(?=[-+.\d])")
 """Name of the number that follows, as in ``ax: 0.12`` or ``ax=0.12``."""
 _DECIMAL_COMMA = r"^([+-]?[0-9]*),([0-9]+([eE][+-]?[0-9]+)?)$"
 _NUMBER = r"^[+-]?([0-9]+[.]?[0-9]*|[.][0-9]+)([eE]([+]?[0-9]{1,2}|-[0-2]?[0-9]{1,2}))?$"
+_LONG = 1e15  # from which on a whole number may have more digits than a float
 
 
 class TextSource(Source):
@@ -74,41 +74,31 @@ class TextSource(Source):
         """Cells as text, without blanks around them; see `Source`."""
         return pa.table(self._texts(range(self._rows.width)), names=self.unique_names)
 
-    def typed_table(self) -> pa.Table:
-        """Columns that hold only numbers as numbers; see `Source`."""
-        columns = [_to_numbers(column) for column in self.table.columns]
-        return pa.table(columns, names=self.table.column_names)
-
     def columns(self, places: Sequence[int]) -> list[pa.ChunkedArray]:
-        """Columns as numbers where all cells are, which saves time and memory; else as text."""
-        if "table" in vars(self):  # so that the file is read once
-            return super().columns(places)
-        if self._rows.decimal == "." and not self.dates & {*places}:
-            kinds = {p: pa.int64() if p in self._rows.long else pa.float64() for p in places}
-            try:
-                return self._read(kinds).columns
-            except pa.ArrowInvalid:
-                pass
-        return self._texts(places)
+        """Columns of which all cells are numbers as such, others as text; see `Source`."""
+        read = "table" in vars(self)  # so that the file is read once
+        texts = [self.table.column(place) for place in places] if read else self._texts(places)
+        # A text takes more memory than its numbers, so it goes as these come.
+        return [_numbers_if_all_are(texts.pop(0)) for _ in places]
 
     def _numbers(self, column: pa.ChunkedArray, place: int) -> NDArray[Any]:
         if place not in self.dates and pa.types.is_string(column.type):
-            return _numbers_of_text(column)
+            cells = pc.utf8_trim_whitespace(column)
+            cells = pc.if_else(pc.match_substring_regex(cells, _NUMBER), cells, None)
+            return pc.replace_substring_regex(cells, r"^[+]", "").cast(pa.float64()).to_numpy()
         return super()._numbers(column, place)
 
-    def _texts(self, places: Iterable[int]) -> list[pa.ChunkedArray]:
-        """Cells of columns; a row with too many cells is null, as nobody knows which are right."""
-        ragged: list[tuple[int, str]] = []
-
-        def set_aside(row: Any) -> str:
-            ragged.append((row.number - 1, row.text))
-            return "skip"
-
-        try:
-            table = self._read(dict.fromkeys(places, pa.string()), set_aside)
-        except pa.ArrowInvalid as error:
-            raise InputError(f"{self.path}: no table: {one_line(error)}") from None
-        columns = self._with_ragged(table, ragged).columns if ragged else table.columns
+    def _texts(self, places: Sequence[int]) -> list[pa.ChunkedArray]:
+        """Cells of columns."""
+        # Rows as they stand, then all of the usual width, then each one by itself.
+        for is_regular in (None, self._rows.are_regular, lambda _: False):
+            try:
+                columns = self._parse(self._lines(is_regular), places)
+                break
+            except pa.ArrowInvalid as error:
+                failed = InputError(f"{self.path}: no table: {one_line(error)}")
+        else:
+            raise failed
         for i, cells in enumerate(columns):
             if pc.any(pc.match_substring(cells, " ")).as_py():
                 columns[i] = pc.utf8_trim_whitespace(cells)
@@ -116,81 +106,55 @@ class TextSource(Source):
                 columns[i] = pc.replace_substring_regex(columns[i], _DECIMAL_COMMA, r"\1.\2")
         return columns
 
-    def _read(
-        self, kinds: Mapping[int, pa.DataType], set_aside: Callable[[Any], str] | None = None
-    ) -> pa.Table:
-        """Columns of these places and types.
-
-        Rows with fewer or more cells than others are set aside, or an error.
-        """
+    def _parse(self, lines: pa.Buffer, places: Sequence[int]) -> list[pa.ChunkedArray]:
+        """Columns of rows of which each has the usual width."""
         names = [str(place) for place in range(self._rows.width)]
-        types = {names[place]: kind for place, kind in kinds.items()}
+        types = {names[place]: pa.string() for place in places}
         with stage(f"reading {self.path.name}"):
-            if not (content := self._rows_only()).size:
-                return pa.schema(types).empty_table()
+            if not lines.size:
+                return pa.schema(types).empty_table().columns
             return arrow_csv.read_csv(
-                pa.BufferReader(content),
-                # Of several threads none knows the number of its row.
-                arrow_csv.ReadOptions(
-                    column_names=names, use_threads=set_aside is None, block_size=_BLOCK
-                ),
-                arrow_csv.ParseOptions(
-                    delimiter=self._rows.delimiter or " ", invalid_row_handler=set_aside
-                ),
+                pa.BufferReader(lines),
+                arrow_csv.ReadOptions(column_names=names, block_size=_BLOCK),
+                arrow_csv.ParseOptions(delimiter=self._rows.delimiter or " "),
                 arrow_csv.ConvertOptions(
                     column_types=types, include_columns=[*types], strings_can_be_null=False
                 ),
-            )
+            ).columns
 
-    def _with_ragged(self, table: pa.Table, ragged: Sequence[tuple[int, str]]) -> pa.Table:
-        """Rows with those that have fewer or more cells, by their places, where they belong."""
-        width, rows = self._rows.width, list[Sequence[str | None]]()
-        for _, text in ragged:
-            cells = self._rows.split(text)
-            rows.append([None] * width if any(cells[width:]) else [*cells, *[""] * width][:width])
-        columns = [[row[int(name)] for row in rows] for name in table.column_names]
-        more = pa.table([pa.array(c, pa.string()) for c in columns], table.column_names)
-        places, count = np.array([place for place, _ in ragged]), np.arange(len(ragged))
-        order = np.insert(np.arange(len(table)), places - count, len(table) + count)
-        # Blank lines and the like are no rows.
-        none = [place for place, text in ragged if self._rows.clean(text) is None]
-        return pa.concat_tables([table, more]).take(np.delete(order, none))
-
-    def look_up(self, row: int, place: int) -> tuple[str, str]:
-        """See `Source`; reads the file again, which only errors and warnings need."""
-        lines = enumerate(_read(self.path)[0].decode().split("\n"), 1)
-        below = ((n, self._rows.clean(line)) for n, line in lines if n > self._rows.first)
-        rows = ((n, text) for n, text in below if text is not None)
-        number, line = next(islice(rows, row, None), (0, ""))
-        if not number:
-            return f"row {row + 1}", "unreadable"
-        cells = self._rows.split(line)
-        if any(cells[self._rows.width :]):
-            return f"line {number}", f"{len(cells)} columns instead of {self._rows.width}"
-        if place >= len(cells):
-            return f"line {number}", "the line ends before it"
-        return f"line {number}", repr(cells[place][:40]) if cells[place] else "nothing"
-
-    def _rows_only(self) -> pa.Buffer:
-        """Rows of the table, each in a line of its own, in UTF-8."""
+    def _lines(self, are_regular: Callable[[bytes], bool] | None) -> pa.Buffer:
+        """Rows of the table in UTF-8; blocks of lines that are not regular are written anew."""
         content, self._content = self._content or _read(self.path)[0], None
         self._repeated = 0
         lines = BytesIO(content)
         for _ in range(self._rows.first):
             lines.readline()
-        if self._rows.are_clean(content, lines.tell()):
+        if are_regular is None and self._rows.are_clean(content, lines.tell()):
             return pa.py_buffer(content).slice(lines.tell())
+        keep = are_regular or self._rows.are_clean
         blocks = iter(lambda: lines.read(_BLOCK) + lines.readline(), b"")
-        return pa.py_buffer(b"".join(map(self._clean_lines, blocks)))
+        return pa.py_buffer(b"".join(b if keep(b) else self._rewritten(b) for b in blocks))
 
-    def _clean_lines(self, block: bytes) -> bytes:
-        """Lines of a text without those that are no rows."""
-        if self._rows.are_clean(block):
-            return block
+    def _rewritten(self, block: bytes) -> bytes:
+        """Lines of a text as rows of the usual width, without those that are no rows."""
         lines = block.decode().split("\n")
         self._repeated += sum(line.strip() in self._rows.header for line in lines)
-        rows = (row for line in lines if (row := self._rows.clean(line)) is not None)
-        return "".join(f"{row}\n" for row in rows).encode()
+        rows = (self._rows.cells(line) for line in lines)
+        return "".join(self._rows.join(cells) for cells in rows if cells is not None).encode()
+
+    def look_up(self, row: int, place: int) -> tuple[str, str]:
+        """See `Source`; reads the file again, which only errors and warnings need."""
+        lines = enumerate(_read(self.path)[0].decode().split("\n"), 1)
+        below = ((n, self._rows.cells(line)) for n, line in lines if n > self._rows.first)
+        rows = ((n, cells) for n, cells in below if cells is not None)
+        number, cells = next(islice(rows, row, None), (0, []))
+        if not number:
+            return f"row {row + 1}", "unreadable"
+        if any(cells[self._rows.width :]):
+            return f"line {number}", f"{len(cells)} columns instead of {self._rows.width}"
+        if place >= len(cells):
+            return f"line {number}", "the line ends before it"
+        return f"line {number}", repr(cells[place][:40]) if cells[place] else "nothing"
 
 
 class _Rows:
@@ -209,8 +173,6 @@ class _Rows:
     header : tuple of str, lines with names and units
     notes : list of str, how the text was taken
     dates : set of int, places of columns of dates with times
-    long : set of int, places of columns of whole numbers with more digits than a float
-    comment : str, from which on the rest of a line is no data
     """
 
     def __init__(self, lines: Sequence[str], delimiter: str | None, decimal: str) -> None:
@@ -219,7 +181,7 @@ class _Rows:
         # Characters around a line that are no cells; None for all blanks.
         self._around = " \r\n" if delimiter == "\t" else None
         rows = [
-            (i, self.split(line))
+            (i, split_line(line, delimiter))
             for i, line in enumerate(lines)
             if line.strip() and not line.lstrip().startswith(self._comments)
         ]
@@ -242,15 +204,11 @@ class _Rows:
         self.names: list[str] | None = None
         self.notes: list[str] = []
         self._read_header(lines[: self.first], cells)
-        firsts = [next((row[i] for row in cells if row[i:] and row[i]), "") for i in range(usual)]
+        firsts = (next((row[i] for row in cells if row[i:] and row[i]), "") for i in range(usual))
         self.dates = {i for i, cell in enumerate(firsts) if is_stamp(cell)}
-        self.long = {i for i, cell in enumerate(firsts) if re.fullmatch("-?[0-9]{16,19}", cell)}
-        self.comment = next((c for c in "#%" for line in lines if line.lstrip()[:1] == c), "#")
+        self._comment = next((c for c in "#%" for line in lines if line.lstrip()[:1] == c), "#")
         blanks = ("  ", "\t", "\n ", " \n") if delimiter is None else ()
         self._marks = [m.encode() for m in ('"', *self._comments, *self.header, *blanks)]
-        mark = re.escape(delimiter or " ")
-        # A cell whose quotation marks hold neither another mark nor the delimiter.
-        self._quoted = re.compile(f'(^|{mark}) *"([^"{mark}]*)"')
 
     @classmethod
     def told_from(cls, content: bytes, path: Path) -> _Rows:
@@ -269,12 +227,8 @@ class _Rows:
             raise InputError(f"{path}: no line of numbers at the beginning")
         return best
 
-    def split(self, line: str) -> list[str]:
-        """Cells of a line, without surrounding blanks and quotation marks."""
-        return split_line(line, self.delimiter)
-
     def are_clean(self, content: bytes, start: int = 0) -> bool:
-        """Whether there are, from a place on, lines of the table only, as Arrow takes them."""
+        """Whether there are, from a place on, no marks that Arrow takes for something else."""
         # A search for one mark is much faster than for several in a row.
         found = (
             content.find(mark[:1], start) >= 0 and content.find(mark, start) >= 0
@@ -282,29 +236,33 @@ class _Rows:
         )
         return not content.startswith(b" ", start) and not any(found)
 
-    def clean(self, line: str) -> str | None:
-        """A row as Arrow takes it, with quotation marks only where they are needed.
+    def are_regular(self, block: bytes) -> bool:
+        """Whether a block of lines is clean, and has as many cells as rows of the usual width."""
+        delimiter, lines = (self.delimiter or " ").encode(), block.count(b"\n")
+        usual = block.endswith(b"\n") and block.count(delimiter) == lines * (self.width - 1)
+        return usual and b"\n\n" not in block and self.are_clean(block)
 
-        None for any other line.
-        """
+    def cells(self, line: str) -> list[str] | None:
+        """Cells of a row; None of any other line."""
         if (
             not (content := line.strip(self._around))
             or content.startswith(self._comments)
             or line.strip() in self.header
         ):
             return None
-        start = line.split(self.comment)[0]
+        start = line.split(self._comment)[0]
         row = line if start.count('"') % 2 else start
-        if '"' in row:
-            plain = self._quoted.sub(r"\1\2", row)
-            row = self._quote_again(self.split(row)) if '"' in plain else plain
-        return row if self.delimiter or '"' in row else " ".join(row.split())
+        return split_line(row.strip(self._around), self.delimiter)
 
-    def _quote_again(self, cells: Sequence[str]) -> str:
-        """A row of cells, with quotation marks around those that need them."""
+    def join(self, cells: list[str]) -> str:
+        """Line of a row of the usual width; of one with more cells nobody knows which are right."""
         mark = self.delimiter or " "
-        cells = [cell.replace('"', '""') for cell in cells]
-        return mark.join(f'"{c}"' if mark in c or '"' in c else c for c in cells)
+        cells = [] if any(cells[self.width :]) else cells[: self.width]
+        cells = [
+            '"' + cell.replace('"', '""') + '"' if mark in cell or '"' in cell else cell
+            for cell in cells
+        ]
+        return mark.join(cells + [""] * (self.width - len(cells))) + "\n"
 
     def _lacks(self, cells: Sequence[str], full: Sequence[str]) -> bool:
         """Whether a row is like a full one, but for some readings."""
@@ -320,20 +278,21 @@ class _Rows:
         units: list[str] = []
         unfit: list[str] = []
         for number, line in reversed([*enumerate(before, 1)]):
-            text = line.strip(self._around).lstrip("".join(self._comments))
+            text = line.strip(self._around).lstrip("".join(self._comments)).strip(self._around)
             if not text.strip(f" \t-=+|_{self.delimiter or ''}"):  # a rule, or nothing
                 continue
-            cells = self.split(text.strip(self._around))
+            cells = split_line(text, self.delimiter)
             cells = [printable(" ".join(cell.strip("\"'").split())) for cell in cells]
-            if not units and any(cells) and all(is_unit(cell) for cell in cells if cell):
+            if not units and any(cells) and all(unit_of_cell(c) is not None for c in cells if c):
                 units, self.header = cells, (line.strip(),)
                 continue
             self._take_names(cells, rows)
             if self.names is not None:
                 self.header += (line.strip(),)
                 if units:
-                    units += [""] * (self.width - len(units))
-                    self.names = [with_unit(*each) for each in zip(self.names, units, strict=False)]
+                    named = zip(self.names, units + [""] * self.width, strict=False)
+                    both = ((name, name and unit_of_cell(cell)) for name, cell in named)
+                    self.names = [f"{name} [{unit}]" if unit else name for name, unit in both]
                     self.notes.append(f"units: in line {number + 1}, below the names")
                 return
             if len(cells) > 2:
@@ -433,36 +392,16 @@ def _most_frequent(counts: Iterable[int]) -> int:
     return max(Counter(counts).items(), key=lambda item: item[::-1])[0]
 
 
-def _numbers_of_text(column: pa.ChunkedArray) -> NDArray[Any]:
-    """Numbers of cells, NaN where there is none; whole numbers as integers."""
-    if pc.all(pc.match_substring_regex(column[:9], "^-?[0-9]+$")).as_py():
-        try:
-            return column.cast(pa.int64()).to_numpy()
-        except pa.ArrowInvalid:
-            pass
-    try:
-        return column.cast(pa.float64()).to_numpy()
-    except pa.ArrowInvalid:
-        # Somewhere is what is no number, or is written as Arrow does not take it.
-        column = pc.utf8_trim_whitespace(column)
-        column = pc.if_else(pc.match_substring_regex(column, _NUMBER), column, None)
-        column = pc.replace_substring_regex(column, r"^[+]", "")
-        return column.cast(pa.float64()).to_numpy()
-
-
-def _to_numbers(column: pa.ChunkedArray) -> pa.ChunkedArray:
-    """Cells as numbers if that loses no digit of any; as text otherwise."""
-    filled = pc.if_else(pc.equal(column, ""), None, column)
-    for kind in (pa.int64(), pa.float64()):
-        try:
-            numbers = filled.cast(kind)
-        except pa.ArrowInvalid:
-            continue
-        if pa.types.is_integer(kind) or not _has_long(column):
+def _numbers_if_all_are(cells: pa.ChunkedArray) -> pa.ChunkedArray:
+    """Cells as numbers, empty ones as null, if that loses no digit of any; as text otherwise."""
+    empty = pc.equal(cells, "")
+    filled = pc.if_else(empty, None, cells) if pc.any(empty).as_py() else cells
+    with suppress(pa.ArrowInvalid):
+        return filled.cast(pa.int64())
+    with suppress(pa.ArrowInvalid):
+        numbers = filled.cast(pa.float64())
+        long = pc.any(pc.greater_equal(pc.abs(numbers), _LONG)).as_py()
+        digits = r"^\s*[+-]?[0-9]{16,}\s*$"
+        if not (long and pc.any(pc.match_substring_regex(cells, digits)).as_py()):
             return numbers
-    return column
-
-
-def _has_long(column: pa.ChunkedArray) -> bool:
-    """Whether a cell is a whole number of more digits than a float has."""
-    return bool(pc.any(pc.match_substring_regex(column, r"^\s*[+-]?[0-9]{16,}\s*$")).as_py())
+    return cells
