@@ -89,9 +89,8 @@ def test_a_large_reading_costs_no_digits():
     forces = rng.normal(0, 1e-6, (60_000, 3)) + np.array([0, 0, G])
     expected, _ = window_variance(forces[-2000:], 101)
     forces[100, 0] = 9000.0
-    np.testing.assert_allclose(
-        window_variance(forces, 101)[0][-len(expected) :], expected, rtol=1e-3
-    )
+    found, _ = window_variance(forces, 101)
+    np.testing.assert_allclose(found[-1950:-50], expected[50:-50], rtol=1e-3)
 
 
 def test_a_gap_keeps_the_clock_and_the_blocks(tmp_path):

@@ -5,6 +5,7 @@ A hold is a run of samples about which the windows of all sensors are at rest.
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import pairwise
@@ -41,6 +42,8 @@ MIN_REST = 8
 """Samples left of a rest from which on it is told; a sensor that turns back is still for fewer."""
 MAX_WANDER = 2.0
 """A hold whose standard deviation is more than this many thresholds of a window is none."""
+SATURATED = "the sensor is saturated there"
+TURNS = "the force changes there by more than its noise, since the sensor turns slowly"
 SLOW_RATIO, QUICK_RATIO = 2.0, 0.2
 """Allan deviation, as a multiple of that of white noise, from which on a motion is slow, such as
 that of a hand; seconds, below which motions are vibrations, which do not harm a mean."""
@@ -143,7 +146,8 @@ def find_holds(
     Returns
     -------
     list of Holds
-        For each sensor; a hold in which one sensor is saturated is missing for that one only.
+        For each sensor, with the same numbers; those in which it is saturated, or turns, are left
+        out of its own.
 
     Raises
     ------
@@ -156,38 +160,45 @@ def find_holds(
     thresholds = [each.threshold(settings.threshold_mps2) for each in windows]
     limits = [threshold.sd for threshold in thresholds]
     runs, too_short = _runs_at_rest(windows, limits, seconds, settings)
-    full = np.array([find_saturated(each, runs, settings.full_range) for each in windows], bool)
-    # A sensor that turns slowly is nearly still in each window, yet has no constant attitude: its
-    # force changes over the run by more than within each of them.
-    sds = np.array([[scatter(log.forces[run]) for run in runs] for log in logs])
-    turns = ~full & (sds > MAX_WANDER * np.array(limits)[:, None])
-    good = ~full & ~turns
-    numbers = dict(enumerate(np.flatnonzero(good.any(axis=0)).tolist(), 1))
+    unfit = [
+        _unfit(each, runs, limit, settings.full_range)
+        for each, limit in zip(windows, limits, strict=True)
+    ]
+    numbers = dict(enumerate(range(len(runs)), 1))
     if one_each:
-        part = logs[0].part
-        by_length = sorted(numbers.values(), key=lambda i: runs[i].stop - runs[i].start)
-        numbers = dict(sorted({int(part[runs[i].start]) + 1: i for i in by_length}.items()))
+        part, useless = logs[0].part, set(unfit[0]).intersection(*unfit)
+        last_is_best = sorted(
+            numbers.values(), key=lambda i: (i not in useless, runs[i].stop - runs[i].start)
+        )
+        numbers = dict(sorted({int(part[runs[i].start]) + 1: i for i in last_is_best}.items()))
     result = []
-    for k, (each, threshold) in enumerate(zip(windows, thresholds, strict=True)):
-        holds = {n: runs[i] for n, i in numbers.items() if good[k, i]}
-        warnings, wandering = each.warnings(), int(turns[k].sum())
-        for count, why in (
-            (int(full[k].sum()), "the sensor is saturated there"),
-            (wandering, "the force changes there by more than its noise, since the sensor turns "
-             "slowly"),
-        ):  # fmt: skip
-            if count:
-                warnings.append(f"{plural(count, 'hold')} left out: {why}")
-        warnings += too_short
-        if not holds and wandering:
-            raise _never_still(each, "it turns slowly in all that looks like a hold", seconds)
-        if not holds:
+    for each, threshold, reasons in zip(windows, thresholds, unfit, strict=True):
+        left_out = {n: reasons[i] for n, i in numbers.items() if i in reasons}
+        why = Counter(left_out.values())
+        lost = [f"{plural(count, 'hold')} left out: {reason}" for reason, count in why.items()]
+        warnings = [*each.warnings(), *lost, *too_short]
+        if len(left_out) == len(numbers):
+            if TURNS in why:
+                raise _never_still(each, "it turns slowly in all that looks like a hold", seconds)
             raise InputError(
                 f"{each.log.path}: no static hold of {settings.shortest_s:g} s or more (a window "
                 f"is at rest up to {threshold.sd:.3g} m/s²)" + "".join(f"; {w}" for w in warnings)
             )
-        result.append(_holds_of(each, threshold, holds, warnings, settings))
+        holds = {n: runs[i] for n, i in numbers.items()}
+        result.append(_holds_of(each, threshold, holds, warnings, settings, left_out))
     return result
+
+
+def _unfit(
+    windows: Windows, runs: Sequence[slice], limit: float, full_range: float
+) -> dict[int, str]:
+    """Places of the runs at rest that are no holds of a sensor, and why."""
+    full = find_saturated(windows, runs, full_range)
+    # A sensor that turns slowly is nearly still in each window, yet has no constant attitude: its
+    # force changes over the run by more than within each of them.
+    turns = [scatter(windows.log.forces[run]) > MAX_WANDER * limit for run in runs]
+    reasons = {i: TURNS for i, turning in enumerate(turns) if turning}
+    return reasons | {i: SATURATED for i, saturated in enumerate(full) if saturated}
 
 
 def _runs_at_rest(
@@ -198,7 +209,8 @@ def _runs_at_rest(
     Also a line about rests that are too short, with the option that takes them.
     """
     step, shortest = windows[0].log.step, settings.shortest_s
-    still = np.all([w.are_at_rest(limit) for w, limit in zip(windows, limits, strict=True)], axis=0)
+    quiet = [each.variance <= sd**2 for each, sd in zip(windows, limits, strict=True)]
+    still = np.all(quiet, axis=0)
     edges = np.flatnonzero(np.diff(still, prepend=False, append=False)).reshape(-1, 2)
     cut, least = round(settings.trim_s / step), max(2, round(shortest / step))
     rests = edges + np.array([cut, -cut])
@@ -252,7 +264,7 @@ def find_blocks(log: Recording, settings: ImportSettings) -> Holds:
     blocks = {n: each for n, each in all_blocks.items() if each.stop - each.start >= PARTS}
     windows = Windows(log, (least // 2) | 1)
     full = find_saturated(windows, [*blocks.values()], settings.full_range)
-    left_out = {n: "the sensor is saturated" for n, f in zip(blocks, full, strict=True) if f}
+    left_out = {n: SATURATED for n, f in zip(blocks, full, strict=True) if f}
     scatters = {
         n: scatter(np.array([p.mean(axis=0) for p in np.array_split(log.forces[each], PARTS)]))
         for n, each in blocks.items()
@@ -329,10 +341,10 @@ def _holds_of(
     holds: Mapping[int, slice],
     warnings: list[str],
     settings: ImportSettings,
-    left_out: Mapping[int, str] | None = None,
+    left_out: Mapping[int, str],
     size: int | None = None,
 ) -> Holds:
-    """Holds without those that a person leaves out, if the sensor was still in them.
+    """Holds, of which a person leaves out some, too, if the sensor was still in the others.
 
     Raises
     ------
@@ -340,7 +352,7 @@ def _holds_of(
         If there is no such hold, a person leaves all of them out, or the sensor was never still.
     """
     log, table = windows.log, hold_table(windows.log, holds)
-    left_out = {**(left_out or {}), **settings.left_out}
+    left_out = {**left_out, **settings.left_out}
     for number in sorted(left_out.keys() - holds.keys()):
         there = short_list([str(each) for each in holds])
         raise InputError(f"exclude: there is no hold {number}; they are {there}")
@@ -383,8 +395,9 @@ def _never_still(windows: Windows, why: str, seconds: float, size: int | None = 
             f"{windows.log.path}: blocks of {size} samples are no positions: {why}; is the number "
             "of samples (`block`) right, or does a file hold a move?"
         )
+    least = np.sqrt(np.nanquantile(windows.variance, 0.01))
     return InputError(
         f"{windows.log.path}: the sensor was never still: {why}; the quietest hundredth of its "
-        f"windows of {seconds:g} s varies by {windows.quietest():.3g} m/s². Lay it down for some "
-        "seconds in each of ten or more attitudes, on a table or in a fixture"
+        f"windows of {seconds:g} s varies by {least:.3g} m/s². Lay it down for some seconds in "
+        "each of ten or more attitudes, on a table or in a fixture"
     )

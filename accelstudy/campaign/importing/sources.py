@@ -87,11 +87,11 @@ class Source:
         return [f"{name}.{n}" if n else name for name, n in zip(self.names, before, strict=True)]
 
     def typed_table(self) -> pa.Table:
-        """The table, with numbers as such, where those of a text are cells as they stand."""
-        return pa.table(self.columns(range(len(self.names))), names=self.unique_names)
+        """The table, with numbers as such; only those of a text are not yet."""
+        return self.table
 
     def columns(self, places: Sequence[int]) -> list[pa.ChunkedArray]:
-        """Columns, with numbers as such."""
+        """Columns of which only the numbers matter."""
         return [self.table.column(place) for place in places]
 
     def numbers(self, places: Sequence[int]) -> list[NDArray[Any]]:
