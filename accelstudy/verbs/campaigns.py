@@ -54,7 +54,7 @@ def read_log(
         If there is no such file, or a value is wrong.
     """
     given = {**locals()}
-    from accelstudy.campaign.importing.formats import open_source
+    from accelstudy.campaign.importing.sources import open_source
     from accelstudy.campaign.importing.log import log_of
 
     read = log_of(log, given)

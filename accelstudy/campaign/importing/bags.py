@@ -14,11 +14,12 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
+import pyarrow as pa
 from numpy.typing import NDArray
 
 from accelstudy.basics.errors import InputError
 from accelstudy.basics.wording import one_line
-from accelstudy.campaign.importing.sources import Source, chosen_of, table_of_columns
+from accelstudy.campaign.importing.sources import Source, chosen_of
 from accelstudy.files.reading import readable
 
 if TYPE_CHECKING:
@@ -27,6 +28,9 @@ if TYPE_CHECKING:
 
 Array = NDArray[np.float64]
 
+BAGS = (b"#ROSBAG V2.0", b"\x89MCAP0", b"SQLite format 3\0")
+ULOG = b"ULog\x01\x12\x35"
+"""First bytes of bags, and of a flight log."""
 BAG_OF_FOLDER = "metadata.yaml"
 """File by which a folder is a bag of ROS 2."""
 
@@ -93,7 +97,8 @@ def _source(
     """Times, s, forces, m/s², and perhaps temperatures as a table."""
     si = {"unit": "m/s^2", "time_unit": "s"}
     layout = {"columns": columns, "time": "time", "frame": frame, **si}
-    return Source(path, table_of_columns(rows.T, ["time", *columns.values()]), layout, warnings)
+    table = dict(zip(("time", *columns.values()), rows.T, strict=True))
+    return Source(path, pa.table(table), layout, warnings)
 
 
 def _messages(reader: AnyReader, connections: Sequence[Connection]) -> Iterator[tuple[float, Any]]:

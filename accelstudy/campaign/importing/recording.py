@@ -21,9 +21,8 @@ from accelstudy.basics.errors import InputError, UnknownNameError
 from accelstudy.basics.units import CLOCK_UNITS, SENSOR_UNITS, UNITS
 from accelstudy.basics.wording import plural, short_list
 from accelstudy.campaign.header import LogLayout, Place
-from accelstudy.campaign.importing.formats import open_source
 from accelstudy.campaign.importing.names import places_by_name, unit_in, without_unit
-from accelstudy.campaign.importing.sources import LogFile, Source
+from accelstudy.campaign.importing.sources import LogFile, Source, open_source
 from accelstudy.files.reading import overlay
 from accelstudy.sensors.conversion import MAX_VALUE, Conversion, conversion_of
 
@@ -85,13 +84,12 @@ def read_log(
     if {"time", "rate_hz"} <= given.keys():
         raise InputError(f"{path}: give the rate or the column of time, not both")
     kind = LogLayout if layout is None else type(layout)
-    chosen = _laid_over(like, given, kind)
-    source = open_source(path, chosen.variable)
+    source = open_source(path, _laid_over(like, given, kind).variable)
     told: dict[str, Any] = {}
     if another := like is None or like.columns.get("fx") not in source.names:
         told = {k: v for k, v in source.layout.items() if k != "time" or "rate_hz" not in given}
-        chosen = _laid_over(like, overlay(told, given), kind)
     try:
+        chosen = _laid_over(like, overlay(told, given), kind)
         places = _places(source, chosen, given, conditions, untimed)
     except InputError as error:
         if like is None or "columns" in given:
@@ -103,10 +101,7 @@ def read_log(
     if another:
         told = {**_units(source, places), **told}
         chosen = _laid_over(like, overlay(told, given), kind)
-    conversion = conversion_of(chosen.unit, chosen.scale, chosen.offset)
-    factor = UNITS["s"]["s" if "nanoseconds" in places else chosen.time_unit]
-    factor = 1e-9 if places.get("time") in source.dates else factor
-    return SensorLog(source, chosen, places, factor, conversion)
+    return SensorLog(source, chosen, places)
 
 
 def _laid_over(
@@ -250,20 +245,28 @@ class SensorLog:
     layout : LogLayout, how they are read
     places : mapping of "fx", "fy", "fz" and perhaps "time", "nanoseconds" (to be added to a time
         in whole seconds) and `CONDITIONS` to columns
-    time_factor : float, s per unit of the column of time, of whose dates these are ns
-    conversion : Conversion, of forces to m/s², in the axes of the log
     """
 
     source: Source
     layout: LogLayout
     places: Mapping[str, int]
-    time_factor: float
-    conversion: Conversion
 
     @property
     def path(self) -> Path:
         """Name of the log in messages."""
         return self.source.path
+
+    @property
+    def conversion(self) -> Conversion:
+        """Conversion of forces to m/s², in the axes of the log."""
+        return conversion_of(self.layout.unit, self.layout.scale, self.layout.offset)
+
+    @property
+    def time_factor(self) -> float:
+        """S per unit of the column of time."""
+        if self.places.get("time") in self.source.dates:
+            return UNITS["s"]["ns"]
+        return UNITS["s"]["s" if "nanoseconds" in self.places else self.layout.time_unit]
 
     @property
     def conditions(self) -> tuple[str, ...]:
@@ -293,33 +296,28 @@ class SensorLog:
     def _numbers(self) -> tuple[Mapping[str, Array], Array, float]:
         numbers = self.source.numbers([*self.places.values()])
         values = dict(zip(self.places, numbers, strict=True))
-        rows, start = {}, np.nan
+        rows, start, count = {}, np.nan, len(values["fx"])
         if "time" in values:
-            time, start = counted_from_first(values["time"])
-            time[~_within_limits(time)] = np.nan
-            time *= self.time_factor
+            time, start = _counted_from_first(values["time"])
+            time = self.time_factor * _usable(time)
             if "nanoseconds" in values:
-                rest = values["nanoseconds"]
-                time += np.where(_within_limits(rest), 1e-9 * rest, np.nan)
+                time += 1e-9 * _usable(values["nanoseconds"])
             first = next(iter(time[np.isfinite(time)]), 0.0)
             rows["time"], start = time - first, start * self.time_factor + first
         elif self.layout.rate_hz is not None:
-            rows["time"] = np.arange(len(values["fx"])) / self.layout.rate_hz
-        frame, conversion = self.layout.axes, self.conversion
-        forces = np.empty((3, len(values["fx"])))
+            rows["time"] = np.arange(count) / self.layout.rate_hz
+        frame, conversion, forces = self.layout.axes, self.conversion, np.empty((3, count))
         for force, sign, i in zip(forces, frame.signs, frame.order, strict=True):
             own = conversion.axis(i)
             np.subtract(values.pop(AXES[i]), own.offset, out=force)
             force *= sign * own.scale
         # The unit may be wrong, which the means of the holds show, but it is the same in all rows.
-        usual = np.abs(forces[:, :SAMPLED_ROWS]).max(axis=0)
-        usual = usual[_within_limits(usual)]
+        usual = _usable(np.abs(forces[:, :SAMPLED_ROWS]).max(axis=0))
+        usual = usual[np.isfinite(usual)]
         limit = max([MAX_FORCE, *([1000 * np.median(usual)] if len(usual) else [])])
-        for force in forces:
-            force[~_within_limits(force, limit)] = np.nan
-        rows |= zip(AXES, forces, strict=True)
-        for key in self.conditions:
-            rows[key] = np.where(_within_limits(values[key]), values[key], np.nan)
+        for key, force in zip(AXES, forces, strict=True):
+            rows[key] = _usable(force, limit)
+        rows |= {key: _usable(values[key]) for key in self.conditions}
         return rows, forces.T, start
 
     @cached_property
@@ -342,7 +340,7 @@ class SensorLog:
         return f"{where}, column {self.source.names[place]} ({key}): {cell}"
 
 
-def counted_from_first(values: NDArray[Any]) -> tuple[Array, float]:
+def _counted_from_first(values: NDArray[Any]) -> tuple[Array, float]:
     """Numbers counted from the first of them, and that first one; NaN if there is none.
 
     Whole numbers, such as times in ns, are counted as integers.
@@ -353,9 +351,14 @@ def counted_from_first(values: NDArray[Any]) -> tuple[Array, float]:
     return values - float(zero), float(zero)
 
 
-def _within_limits(values: NDArray[Any], largest: float = MAX_VALUE) -> NDArray[np.bool_]:
-    """Which numbers are at most ±`largest`; by default, those that can be calculated with."""
-    return np.asarray((values >= -largest) & (values <= largest))
+def _usable(values: NDArray[Any], largest: float = MAX_VALUE) -> Array:
+    """Numbers of at most ±`largest`, by default those that can be calculated with; else NaN.
+
+    An array of floats is changed itself, unless nothing may write to it.
+    """
+    numbers = np.require(values, float, "W")
+    numbers[~(np.abs(numbers) <= largest)] = np.nan
+    return numbers
 
 
 class Recording:

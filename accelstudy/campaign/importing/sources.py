@@ -1,4 +1,4 @@
-"""Tables of numbers as they stand in their files: MATLAB, Parquet, or a table in memory."""
+"""Tables of numbers as they stand in their files, which are opened here, whatever their format."""
 
 from __future__ import annotations
 
@@ -18,6 +18,10 @@ from accelstudy.campaign.importing.names import layout_by_names
 from accelstudy.files.parquet import whole_parquet
 from accelstudy.files.reading import readable
 
+_CONTROLS = re.compile(rb"[\x01-\x08\x0e-\x1a\x1c-\x1f]")
+"""Bytes that no text has, in UTF-16 either."""
+_NO_TABLE = re.compile(rb"BZh|%PDF|(\xef\xbb\xbf)?\s*[\[{]\s*[\[{\"}]")
+"""What files begin with that look like text: an archive, a document, JSON."""
 _IS_NUMBER = re.compile("double|single|u?int[0-9]+")  # classes of MATLAB arrays
 _CLOCK = r"\d{1,2}:\d\d(:\d\d([.,:]\d+)?)?"
 _ISO = r"\d{4}-?\d\d-?\d\d[T ]\d\d(:?\d\d.*)?"
@@ -125,6 +129,50 @@ LogFile = str | Path | Source
 """Where a log is: the path of a file, or a table in memory."""
 
 
+def open_source(path: LogFile, variable: str | None = None) -> Source:
+    """Open a file of numbers, by its ending and its first bytes; a new format is one line here.
+
+    Parameters
+    ----------
+    path : file, or a table in memory, which is a source already; a pipe is none, since a log is
+        read more than once
+    variable : str, which array of a MATLAB file, topic of a bag or sensor of a flight log
+    """
+    if isinstance(path, Source):
+        return path
+    from accelstudy.campaign.importing import bags
+    from accelstudy.campaign.importing.text import GZIP, TextSource
+
+    path = Path(path)
+    with readable(path):
+        if (path / bags.BAG_OF_FOLDER).is_file():
+            return bags.open_bag(path, variable)
+        if not (path.is_file() or path.is_dir()) and path.stat():
+            raise InputError(
+                f"{path}: a pipe or a device, and a log is read more than once; save it in a file"
+            )
+        with path.open("rb") as file:
+            start = file.read(128)
+    if not start:
+        raise InputError(f"{path}: the file is empty")
+    if path.suffix.lower() in (".parquet", ".pq"):
+        with whole_parquet(path) as parquet:
+            return Source(path, parquet.read())
+    # An ASCII .mat has no zero bytes; every binary one has some in its header.
+    if path.suffix.lower() == ".mat" and 0 in start:
+        return _open_matlab(path, variable)
+    if start.startswith(bags.BAGS):
+        return bags.open_bag(path, variable)
+    if start.startswith(bags.ULOG):
+        return bags.open_ulog(path, variable)
+    if not start.startswith(GZIP) and (_NO_TABLE.match(start) or _CONTROLS.search(start)):
+        raise InputError(
+            f"{path}: no text, MATLAB file up to version 7, Parquet, bag or ULog; unpack an "
+            "archive, and save a workbook or JSON as CSV, with a row for each sample"
+        )
+    return TextSource(path)
+
+
 def chosen_of(path: Path, what: str, found: Collection[str], wanted: str | None) -> str:
     """The one that is wanted, or the only one."""
     if wanted is not None and wanted not in found:
@@ -138,13 +186,7 @@ def chosen_of(path: Path, what: str, found: Collection[str], wanted: str | None)
     return next(iter(found)) if wanted is None else wanted
 
 
-def open_parquet(path: Path) -> Source:
-    """Open a Parquet file."""
-    with whole_parquet(path) as file:
-        return Source(path, file.read())
-
-
-def open_matlab(path: Path, variable: str | None = None) -> Source:
+def _open_matlab(path: Path, variable: str | None = None) -> Source:
     """Open a MATLAB file; it is read as a whole, since the format allows 2 GB at most."""
     from scipy.io import loadmat, whosmat
 
@@ -167,13 +209,7 @@ def open_matlab(path: Path, variable: str | None = None) -> Source:
         raise InputError(f"{path}: array {name} has complex numbers")
     # An array with few rows and many columns has the samples in its columns.
     columns = array if array.shape[0] < array.shape[1] else array.T
-    return Source(path, table_of_columns(columns), named=False)
-
-
-def table_of_columns(columns: NDArray[Any], names: Sequence[str] = ()) -> pa.Table:
-    """Columns (c, n) as a table; they have their places as names if they have no others."""
-    names = names or [str(place) for place in range(len(columns))]
-    return pa.table([*map(pa.array, columns)], names=[*names])
+    return Source(path, pa.table({str(i): c for i, c in enumerate(columns)}), named=False)
 
 
 def is_stamp(text: str) -> bool:
