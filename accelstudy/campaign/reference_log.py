@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import permutations, product
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,11 +18,7 @@ from accelstudy.campaign.gross_errors.recognition import check_size
 from accelstudy.campaign.header import LogLayout
 from accelstudy.campaign.importing.detection import MAX_WANDER, Holds, reaches_range, scatter
 from accelstudy.campaign.importing.noise import hold_noise, sigma_text
-from accelstudy.campaign.importing.recording import (
-    AXES,
-    Recording,
-    read_log,
-)
+from accelstudy.campaign.importing.recording import AXES, Recording, read_log
 from accelstudy.campaign.importing.windows import Windows
 from accelstudy.campaign.reference import ReferenceSensor
 from accelstudy.files.validation import validate
@@ -88,25 +84,6 @@ def open_reference(
     return ReferenceLog(path, sensor, Recording([log]), offset)
 
 
-class Angles(NamedTuple):
-    """Roll and pitch of holds by a reference.
-
-    Attributes
-    ----------
-    holds : Holds, those that it covers
-    columns : dict, what the campaign gets
-    left_out : dict of int to str, holds that are too near to the pole for a roll, and why
-    warnings : list of str
-    note : str, how the reference was used
-    """
-
-    holds: Holds
-    columns: dict[str, Any]
-    left_out: dict[int, str]
-    warnings: list[str]
-    note: str
-
-
 @dataclass(frozen=True)
 class ReferenceLog:
     """The open log of a reference, and its calibration; see `open_reference`."""
@@ -116,7 +93,9 @@ class ReferenceLog:
     log: Recording
     offset: float | None
 
-    def angles_for(self, holds: Holds, offset: Array, gravity: float) -> Angles:
+    def angles_for(
+        self, holds: Holds, offset: Array, gravity: float
+    ) -> tuple[Holds, dict[str, Any], str]:
         """Roll and pitch of the holds of a log, by the means of the reference in them.
 
         Parameters
@@ -124,6 +103,12 @@ class ReferenceLog:
         holds : Holds
         offset : (3,) array, m/s², of their means
         gravity : float, m/s²
+
+        Returns
+        -------
+        holds : Holds, those that it covers; what is too near to the pole for a roll is left out
+        columns : dict, what the campaign gets
+        note : str, how the reference was used
 
         Raises
         ------
@@ -134,16 +119,13 @@ class ReferenceLog:
         # Both begin together unless they have one clock.
         apart = self.log.starts[0] - holds.log.starts[0]
         records, lost = self._records(holds, float(np.nan_to_num(apart)) + (self.offset or 0.0))
-        means = {n: record.mean(axis=0) for n, record in records.items()}
-        self._check_size(np.array([*means.values()]), gravity)
-        lost |= self._moving(records)
         holds = holds.without(lost)
-        table = holds.table
-        used = ~table.index.isin([*holds.left_out])
-        own = self.calibration.correct(np.array([means[n] for n in table.index]))
+        means = np.array([records[n].mean(axis=0) for n in holds.table.index])
+        self._check_size(means, gravity)
+        own, used = self.calibration.correct(means), holds.are_used
         frame = self._frame((holds.means - offset)[used], own[used])
         angles = angles_of(frame.to_frd(own))
-        resting = [records[n] for n in table.index[used]]
+        resting = [records[n] for n in holds.table.index[used]]
         noise = hold_noise(resting, self.log.step).accuracy.allan
         reference = ReferenceSensor(
             calibration=self.calibration.content["campaign"],
@@ -156,41 +138,57 @@ class ReferenceLog:
         sigma, common = reference.errors(angles, gravity)
         poles = near_pole(angles, np.hypot(sigma, np.linalg.norm(common, axis=-1)))
         why = "the x axis of the reference is too near to the vertical for a roll"
+        near = dict.fromkeys(holds.table.index[poles].tolist(), why)
+        holds = replace(
+            holds,
+            left_out={**near, **holds.left_out},
+            warnings=(*holds.warnings, *(f"hold {n} left out: {why}" for n in near)),
+        )
         clock = "of the same clock" if np.isfinite(apart) else "begun together with the log"
         clock += "" if self.offset is None else f", {self.offset:+g} s"
-        note = (
-            f"reference: {self.path}, {clock}; its axes x, y, z point "
-            f"{frame.description.split(': ')[1]}, as frd of the sensor; sigma of a mean: "
-            f"{sigma_text(noise)}"
-        )
         columns = {"angles": angles, "sigma_angle": noise / gravity, "reference": reference}
-        left_out = dict.fromkeys(table.index[poles].tolist(), why)
-        warnings = [f"hold {n} left out: {why}" for n in left_out]
-        return Angles(holds, columns, left_out, warnings, note)
+        return (
+            holds,
+            columns,
+            (
+                f"reference: {self.path}, {clock}; its axes x, y, z point "
+                f"{frame.description.split(': ')[1]}, as frd of the sensor; sigma of a mean: "
+                f"{sigma_text(noise)}"
+            ),
+        )
 
     def _records(self, holds: Holds, apart: float) -> tuple[dict[int, Array], dict[int, str]]:
         """Samples (m, 3) of the reference, m/s², in holds, and why it has none in others."""
-        read, table = self.log, holds.table
+        read, table, where = self.log, holds.table, f"`reference_log` {self.path}"
         full_range = self.calibration.content.get("range_mps2") or np.inf
+        limit = MAX_WANDER * Windows.lasting(read).threshold().sd
         time, forces = read.time + apart, read.forces @ self.calibration.mending.T
         records: dict[int, Array] = {}
         lost: dict[int, str] = {}
+        moving = 0
         for n, t0, t1 in table[["t0", "t1"]].itertuples():
-            inside = slice(*np.searchsorted(time, [t0, t1 + holds.log.step / 2]).tolist())
-            count = inside.stop - inside.start
-            if count * read.step < MIN_COVERAGE * (t1 - t0) or count < MIN_SAMPLES:
+            record = forces[slice(*np.searchsorted(time, [t0, t1 + holds.log.step / 2]))]
+            if len(record) * read.step < MIN_COVERAGE * (t1 - t0) or len(record) < MIN_SAMPLES:
                 lost[n] = "the reference log does not cover it"
-            elif reaches_range(forces[inside], full_range):
+            elif reaches_range(record, full_range):
                 lost[n] = "the reference is saturated"
+            elif (sd := scatter(record)) > limit:
+                lost[n] = f"the reference moves: its sd is {sd:.2g} m/s²"
+                moving += 1
             else:
-                records[n] = forces[inside]
+                records[n] = record
+        if moving > len(records):
+            raise InputError(
+                f"{where}: the reference moves in {moving} of {moving + len(records)} holds; is it "
+                "on one plate with the sensor, and are its times right (`reference_offset`)?"
+            )
         if not records:
             first, last = table["t0"].iloc[0], table["t1"].iloc[-1]
             raise InputError(
-                f"`reference_log` {self.path}: runs from {time[0]:.6g} s to {time[-1]:.6g} s of "
-                f"the time of {holds.log.path}, whose holds lie from {first:.6g} s to {last:.6g} "
-                f"s: all are left out, the first because {next(iter(lost.values()))}; "
-                "`reference_offset` gives the seconds to add to the times of the reference"
+                f"{where}: runs from {time[0]:.6g} s to {time[-1]:.6g} s of the time of "
+                f"{holds.log.path}, whose holds lie from {first:.6g} s to {last:.6g} s: all are "
+                f"left out, the first because {next(iter(lost.values()))}; `reference_offset` "
+                "gives the seconds to add to the times of the reference"
             )
         return records, lost
 
@@ -204,19 +202,6 @@ class ReferenceLog:
                 f"{str(error).split('; give')[0]}; it is read in the unit of the log of which "
                 "`reference` was made"
             ) from None
-
-    def _moving(self, records: Mapping[int, Array]) -> dict[int, str]:
-        """Holds in which the reference moves; most of them are an error."""
-        limit = MAX_WANDER * Windows.lasting(self.log).threshold().sd
-        sds = {n: scatter(record) for n, record in records.items()}
-        moving = {n: sd for n, sd in sds.items() if sd > limit}
-        if len(moving) > len(records) / 2:
-            raise InputError(
-                f"`reference_log` {self.path}: the reference moves in {len(moving)} of "
-                f"{len(records)} holds; is it on one plate with the sensor, and are its times "
-                "right (`reference_offset`)?"
-            )
-        return {n: f"the reference moves: its sd is {sd:.2g} m/s²" for n, sd in moving.items()}
 
     def _frame(self, forces: Array, own: Array) -> Frame:
         """Quarter turns from the axes of the reference to those of a sensor.

@@ -93,6 +93,11 @@ class Holds:
         """Usual distance of the means from the zero point of the specific forces, m/s²."""
         return usual_norm(self.means - self.noise.center)
 
+    @property
+    def are_used(self) -> NDArray[np.bool_]:
+        """Which of them are not left out, (n,)."""
+        return ~self.table.index.isin([*self.left_out])
+
     def without(self, reasons: Mapping[int, str]) -> Holds:
         """Return the others, as if these had not been found, with warnings that say why."""
         return replace(

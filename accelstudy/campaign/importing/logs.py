@@ -182,44 +182,36 @@ def _campaign_of_holds(holds: Holds, reference: ReferenceLog | None) -> Imported
 
     Holds that the reference does not cover are neither in the campaign nor in the holds.
     """
-    log, settings = holds.log, holds.log.first.layout
+    log, settings, note = holds.log, holds.log.first.layout, ""
     assert isinstance(settings, ImportSettings)
-    gravity, beside = settings.gravity.value_mps2, None
+    gravity = settings.gravity.value_mps2
     settings, offset = _with_offset(settings, holds)
-    if reference is not None:
-        beside = reference.angles_for(holds, offset, gravity)
-        holds = beside.holds
-    table, forces, left_out = holds.table, holds.means - offset, dict(holds.left_out)
-    noise, timed = holds.noise, holds.size is None or "time" in log.first.places
-    rounded = noise.rounding > MIN_ROUNDING_RATIO * noise.accuracy.allan
     columns: dict[str, Any] = {}
+    if reference is not None:
+        holds, columns, note = reference.angles_for(holds, offset, gravity)
+    table, noise = holds.table, holds.noise
+    rounded = noise.rounding > MIN_ROUNDING_RATIO * noise.accuracy.allan
+    timed = holds.size is None or "time" in log.first.places
     if timed and (len(log.parts) == 1 or log.timed):
         columns["time"] = ((table["t0"] + table["t1"]) / 2).to_numpy()
-    for name in log.conditions:
-        if table[name].notna().all():
-            columns[name] = table[name].to_numpy()
-    warnings = _warnings(holds, gravity)
-    if beside is not None:
-        columns |= beside.columns
-        warnings += beside.warnings
-        left_out = {**beside.left_out, **left_out}
-    note = "" if beside is None else beside.note
+    known = [name for name in log.conditions if table[name].notna().all()]
+    columns |= {name: table[name].to_numpy() for name in known}
     campaign = _campaign(
         log.path,
         settings,
-        forces,
+        holds.means - offset,
         positions=table.index.to_numpy(),
         sigma_force=noise.sigma,
         sigma_dof=float(round(noise.dof)),
         resolution=holds.windows.steps if rounded else None,
         n_samples=table["n"].to_numpy(),
-        sd=np.column_stack([table[name] for name in SDS]),
+        sd=table[[*SDS]].to_numpy(),
         log=_layout_of(settings, log.first),
         notes=tuple(_notes(holds, settings, bool(offset.any()), note, rounded)),
-        warnings=tuple(warnings),
+        warnings=tuple(_warnings(holds, gravity)),
         **columns,
     )
-    return campaign.without(left_out), holds
+    return campaign.without(holds.left_out), holds
 
 
 def _with_offset(settings: ImportSettings, holds: Holds) -> tuple[ImportSettings, Array]:
