@@ -317,7 +317,7 @@ def test_a_log_is_written_with_all_its_cells(plain, log, tmp_path):
     """What the log had is written as it was; a column of the same name is replaced."""
     mixed_log().assign(roll_gon=0.0).to_csv(log, index=False)
     leveled = level_log(plain, log, tmp_path / "out/level.csv")
-    assert (leveled.rows, leveled.empty) == (N, 0)
+    assert (len(leveled.added), leveled.lost.sum()) == (N, 0)
     text = {"dtype": str, "keep_default_na": False}
     found = pd.read_csv(tmp_path / "out/level.csv", **text)
     pd.testing.assert_frame_equal(found[[*mixed_log()]], pd.read_csv(log, **text)[[*mixed_log()]])
@@ -380,7 +380,7 @@ def test_a_lost_sample_does_not_lose_the_log(plain, log, tmp_path):
     log.write_text("fx,fy,fz,note\n" + "\n".join(rows) + "\n", encoding="utf-8")
     leveled = level_log(plain, log, tmp_path / "out.csv")
     found = pd.read_csv(tmp_path / "out.csv", dtype=str, keep_default_na=False)
-    assert (leveled.rows, leveled.empty) == (7, 5)
+    assert (len(leveled.added), leveled.lost.sum()) == (7, 5)
     assert found["roll_gon"].map(bool).tolist() == [True, *5 * [False], True]
     # A row with too few or too many cells has none: nobody knows which are right.
     assert found["note"].tolist() == ["a", "b", "c", "", "", "e", "f"]
@@ -432,7 +432,7 @@ def test_a_reading_at_the_end_of_the_range_is_no_measurement(plain, tmp_path):
     (tmp_path / "log.csv").write_text("fx,fy,fz\n0,0,-9.05\n1,5,-8\n", encoding="utf-8")
     for known in (clipping, ranged):
         leveled = level_log(known, tmp_path / "log.csv", tmp_path / "out.csv")
-        assert (leveled.rows, leveled.empty) == (2, 1)
+        assert (len(leveled.added), leveled.lost.sum()) == (2, 1)
         (warning,) = leveled.warnings
         assert "line 2: the calibration has no force for such a reading" in warning
         assert ("± 9.05 m/s²" in warning) == (known is ranged)

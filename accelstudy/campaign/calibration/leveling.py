@@ -3,14 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pandas as pd
 import pyarrow as pa
-import pyarrow.compute as pc
 from numpy.typing import NDArray
 
 from accelstudy.basics import bounds
@@ -62,24 +61,19 @@ class LeveledLog:
     Attributes
     ----------
     log : SensorLog, with the rows as they were read
-    added : table of calibrated forces, roll and pitch and their standard deviations, and whether
-        the row is near the pole
+    added : DataFrame of calibrated forces, roll and pitch and their standard deviations, and
+        whether the row is near the pole
     warnings : tuple of str
     """
 
     log: SensorLog
-    added: pa.Table
+    added: pd.DataFrame
     warnings: tuple[str, ...]
 
     @property
-    def rows(self) -> int:
-        """Number of rows."""
-        return len(self.added)
-
-    @property
-    def empty(self) -> int:
-        """Number of rows without a calibrated force."""
-        return self.added.column(0).null_count
+    def lost(self) -> NDArray[np.bool_]:
+        """Which rows have no calibrated force, (n,)."""
+        return self.added.iloc[:, 0].isna().to_numpy()
 
     def to_frame(self, frame: pd.DataFrame | None = None) -> pd.DataFrame:
         """Return the log with the added columns.
@@ -91,22 +85,20 @@ class LeveledLog:
             as they were read if omitted.
         """
         frame = self.log.source.typed_table().to_pandas() if frame is None else frame
-        # With a plain bool a row without an answer would make a column that knows no `~`.
-        columns = self.added.to_pandas(types_mapper={pa.bool_(): pd.BooleanDtype()}.get)
-        return frame.assign(**{name: columns[name].array for name in columns})
+        return frame.assign(**{name: column.array for name, column in self.added.items()})
 
     def tell(self, place: Path) -> None:
         """Print how many rows are leveled, and what the user should know."""
         for warning in self.warnings:
             warn(warning)
-        show(f"{self.rows - self.empty} of {self.rows} rows leveled: {place}")
+        show(f"{np.sum(~self.lost)} of {len(self.added)} rows leveled: {place}")
 
     def write(self, out: str | Path, place: Path | None = None) -> None:
         """Write the log with the added columns, CSV or Parquet; if that fails, there is no file."""
         source = self.log.source
         table = source.typed_table() if is_parquet(out) else source.table
-        columns = dict(zip(table.column_names, table.columns, strict=True))
-        columns |= zip(self.added.column_names, self.added.columns, strict=True)
+        added = pa.Table.from_pandas(self.added, preserve_index=False)
+        columns = {each: own[each] for own in (table, added) for each in own.column_names}
         # The row labels that pandas writes as a column are not part of the log.
         labels = [name for name in columns if name.startswith("__index_level_")]
         write_table(out, pa.table(columns).drop_columns(labels))
@@ -155,24 +147,24 @@ def level(
         bounds.SIGMA_READING.check_key("`sigma`", sigma)
     noise = calibration.noise_of_reading if sigma is None else sigma
     rows = np.arange(len(forces))
-    added = pa.concat_tables(
+    parts = [
         _level_rows(calibration, read, forces[some], hold.take(some), noise)
         for some in track([rows[i : i + ROWS] for i in range(0, len(rows), ROWS)], "leveling")
-    )
-    return LeveledLog(read, added, _warnings(calibration, read, hold, added, mends, start is None))
+    ]
+    leveled = LeveledLog(read, pd.concat(parts, ignore_index=True), ())
+    warnings = _warnings(calibration, leveled, hold, mends, start is None)
+    return replace(leveled, warnings=warnings)
 
 
 def _warnings(
     calibration: SensorCalibration,
-    log: SensorLog,
+    leveled: LeveledLog,
     hold: HoldConditions,
-    added: pa.Table,
     mends: bool,
     assumes_start: bool,
 ) -> tuple[str, ...]:
     """What the user should know of the calibration and of the rows."""
-    lost = added.column(0).is_null().to_numpy()
-    needs = calibration.needs
+    lost, needs = leveled.lost, calibration.needs
     timed = [effect for effect, column in needs if assumes_start and column == "time"]
     lagging = [effect for effect in timed if (effect, "temperature") in needs]
     moved = {effect for effect, column in needs if column.startswith("step_")}
@@ -183,19 +175,19 @@ def _warnings(
         "campaign/calibration/leveling.txt.j2",
         "warnings",
         sensor=calibration,
-        log=log,
+        log=leveled.log,
         mends=mends,
         timed=[effect for effect in timed if effect not in lagging],
         lagging=lagging,
         moved=[effect for effect in calibration.model.effects if effect.name in moved],
-        rows=len(added),
+        rows=len(lost),
         empty=int(lost.sum()),
-        reason=_reason(calibration, log, int(np.argmax(lost))) if lost.any() else "",
-        near=pc.sum(added[NEAR_POLE]).as_py(),
+        reason=_reason(calibration, leveled.log, int(np.argmax(lost))) if lost.any() else "",
+        near=leveled.added[NEAR_POLE].sum(),
         vertical=np.pi / 2,
         after=late,
         many=MANY_SIGMAS,
-        beyond=[*_beyond_ranges(calibration.ranges, log, added, hold)],
+        beyond=[*_beyond_ranges(calibration.ranges, leveled, hold)],
     )
     return tuple(warnings)
 
@@ -211,18 +203,16 @@ def _read(calibration: SensorCalibration, log: LogFile, given: Mapping[str, Any]
         conditions=[key for key in OPTIONS if key in {*needed, *ranged, *given.get("columns", ())}],
         untimed=True,
     )
-    timed = "time" if read.layout.rate_hz is not None else ""
+    known = {*read.places, *(["time"] if read.layout.rate_hz is not None else [])}
     for effect, condition in calibration.needs:
-        if condition not in OPTIONS and not condition.startswith("step_"):
+        if condition in known or condition.startswith("step_"):
+            continue
+        where, how = f"{log}: the effect {effect} needs the {condition} of each row", OPTIONS
+        if condition not in how:
             raise InputError(
-                f"{log}: the effect {effect} needs the {condition} of each row, which no log has; "
-                "a calibration without this effect can be applied"
+                f"{where}, which no log has; a calibration without this effect can be applied"
             )
-        if condition in OPTIONS and condition not in (*read.places, timed):
-            raise InputError(
-                f"{log}: the effect {effect} needs the {condition} of each row; "
-                f"give it by {OPTIONS[condition]}"
-            )
+        raise InputError(f"{where}; give it by {how[condition]}")
     return read
 
 
@@ -247,7 +237,7 @@ def _level_rows(
     forces: Array,
     hold: HoldConditions,
     noise: float,
-) -> pa.Table:
+) -> pd.DataFrame:
     """Columns that are added to rows whose readings, in frd, are forces (k, 3), m/s²."""
     with np.errstate(all="ignore"):  # forces that are not finite are counted below
         corrected = calibration.correct(forces, hold)
@@ -256,27 +246,28 @@ def _level_rows(
     full = calibration.content.get("range_mps2") or np.inf
     lost |= (np.abs(forces) >= SATURATED_SHARE * full).any(axis=1)
     frame = log.layout.axes
-    shown = frame.from_frd(corrected)
-    added = {f"{axis}_calibrated_mps2": shown[:, i] for i, axis in enumerate(AXES)}
+    columns = [f"{axis}_calibrated_mps2" for axis in AXES]
+    added = pd.DataFrame(frame.from_frd(corrected), columns=columns)
     for i, angle in enumerate(("roll", "pitch")):
         added[f"{angle}_{attitude_unit()}"] = frame.signs[i] * to_attitude(angles[:, i])
         added[f"sigma_{angle}_{display_unit('rad')}"] = to_display(sigmas[:, i], "rad")
-    columns = {
-        name: pa.array(np.round(values, DECIMALS), mask=lost | ~np.isfinite(values))
-        for name, values in added.items()
-    }
-    return pa.table({**columns, NEAR_POLE: pa.array(near_pole(angles, sigmas), mask=lost)})
+    added = added.round(DECIMALS).where(np.isfinite)
+    added[lost] = np.nan
+    # With a plain bool a row without an answer would make a column that knows no `~`.
+    near = pd.array(near_pole(angles, sigmas), dtype="boolean")
+    near[lost] = pd.NA
+    return added.assign(**{NEAR_POLE: near})
 
 
 def _beyond_ranges(
-    ranges: Mapping[str, list[float]], log: SensorLog, added: pa.Table, hold: HoldConditions
+    ranges: Mapping[str, list[float]], leveled: LeveledLog, hold: HoldConditions
 ) -> Iterator[dict[str, Any]]:
     """What lies beyond the ranges of a calibration, in how many rows, and how far."""
-    forces = np.column_stack([added.column(i).to_numpy() for i in range(3)])
+    forces = leveled.log.layout.axes.to_frd(leveled.added.iloc[:, :3].to_numpy())
     columns = {
         "temperature_degC": hold.temperature,
         "vibration_mps2": hold.vibration,
-        **dict(zip(FORCES, log.layout.axes.to_frd(forces).T, strict=True)),
+        **dict(zip(FORCES, forces.T, strict=True)),
     }
     for what, unit, names in (
         ("temperature", "°C", ["temperature_degC"]),
