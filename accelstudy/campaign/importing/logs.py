@@ -5,23 +5,22 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, cast
 
 import numpy as np
 from numpy.typing import NDArray
 
 from accelstudy.basics.errors import InputError
-from accelstudy.basics.units import display_unit, to_display
+from accelstudy.basics.units import MGON, UNITS, display_unit, to_display
 from accelstudy.campaign.format import write_campaign
 from accelstudy.campaign.gross_errors.recognition import check_plausible
 from accelstudy.campaign.header import LogLayout, Place
 from accelstudy.campaign.importing.detection import Holds, find_blocks, find_holds
-from accelstudy.campaign.importing.means import read_means
 from accelstudy.campaign.importing.names import thermometers
 from accelstudy.campaign.importing.noise import sigma_text, steps_text
 from accelstudy.campaign.importing.recording import AXES, SDS, Recording, SensorLog, read_log
 from accelstudy.campaign.importing.settings import ImportSettings, named_after
-from accelstudy.campaign.importing.sources import LogFile, open_source
+from accelstudy.campaign.importing.sources import LogFile, Source, open_source
 from accelstudy.campaign.importing.windows import usual_window
 from accelstudy.campaign.session import Campaign
 from accelstudy.sensors.conversion import Conversion, conversion_of
@@ -37,6 +36,10 @@ TEMPLATE = "campaign/importing/logs.txt.j2"
 MAX_ACROSS_RATIO = 1.5
 """Noise across gravity, as a multiple of that along it, from which on a warning says that the
 sensor turns within its holds."""
+ANGLES = ("roll", "pitch")
+MEANS = ("n_samples", *SDS, "temperature", "vibration", *ANGLES, "yaw")
+"""Columns that a table of means may have, besides its forces and its time."""
+_YEARS = 1e8  # s; no session lasts for years, so later times count from 1970
 MIN_ROUNDING_RATIO = 0.1
 """Sigma of rounding over that of noise, from which on the resolution is told and kept."""
 
@@ -87,8 +90,7 @@ def import_sensors(
     settings = named_after(settings, paths)
     files = [open_source(path, settings.variable) for path in paths]
     if settings.means:
-        told, forces, columns = read_means(files[0], settings)
-        return {"": (_campaign(paths[0], told, forces, **columns), None)}
+        return {"": (_campaign_of_means(files[0], settings), None)}
     of_sensors, several = _settings_of_sensors(settings), len(paths) > 1
     untimed = several or settings.block is not None
     parts = {
@@ -174,7 +176,74 @@ def _whole_files(log: Recording, settings: ImportSettings) -> bool:
     return max(log.lengths) * log.step < least
 
 
-# --- The campaign --------------------------------------------------------------------------------
+# --- A table of means ----------------------------------------------------------------------------
+
+
+def _campaign_of_means(file: Source, settings: ImportSettings) -> Campaign:
+    """Campaign of a table of means, a row for each position; a MATLAB array may have columns.
+
+    With `robot` roll, pitch and perhaps yaw are the robot's angles, in the convention of the frame.
+    The campaign has a sigma if the table has numbers of samples and their standard deviations: that
+    of white noise, since a table of means does not say more.
+    """
+    wanted = [*(["time"] if settings.time is not None else []), *MEANS]
+    log = read_log(file, settings, conditions=wanted, untimed=True)
+    settings, frame = cast(ImportSettings, log.layout), log.layout.axes
+    rows, warnings = _rows_of_means(log, settings)
+    columns: dict[str, Any] = {}
+    if "n_samples" in rows:
+        columns["n_samples"] = n_samples = np.round(rows["n_samples"]).astype(int)
+        if np.any(n_samples < 1):
+            raise InputError(f"{file}: column n_samples: must be positive")
+    if {*SDS} <= rows.keys():
+        sd = frame.to_frd_order(np.column_stack([rows[k] for k in SDS]) * abs(log.conversion.scale))
+        columns["sd"] = sd
+        if np.any(sd < 0):
+            raise InputError(f"{file}: columns sd_fx, sd_fy, sd_fz: must not be negative")
+        if "n_samples" in columns and np.any(sd > 0):
+            columns["sigma_force"] = float(np.sqrt(np.mean(sd**2 / n_samples[:, None])))
+            warnings.append("sigma of a mean assumes white noise; coloured noise makes it larger")
+    columns |= {k: rows[k] for k in ("time", "temperature", "vibration") if k in rows}
+    if settings.robot is not None:
+        unit, signs = UNITS["rad"][settings.robot.unit], frame.signs
+        angles = np.column_stack([rows[key] for key in ANGLES]) * signs[:2]
+        columns |= {"angles": angles * unit, "sigma_angle": settings.robot.angle_sigma_mgon * MGON}
+        if "yaw" in rows:
+            columns["yaw"] = rows["yaw"] * unit * signs[2]
+    # Logs of the sensor have the unit and the axes of the table, but not its columns.
+    layout = settings.model_dump(include={"unit", "scale", "offset", "frame"}, exclude_none=True)
+    sigma = sigma_text(columns["sigma_force"]) if "sigma_force" in columns else "unknown"
+    note = f"{len(log.forces)} positions; sigma of a mean: {sigma}"
+    columns |= {"log": LogLayout.model_validate(layout), "notes": (note,)}
+    return _campaign(file.path, settings, log.forces, warnings=tuple(warnings), **columns)
+
+
+def _rows_of_means(log: SensorLog, settings: ImportSettings) -> tuple[dict[str, Array], list[str]]:
+    """Columns of the rows without those that are not used, and warnings about these."""
+    rows, warnings = dict(log.rows), []
+    angles = [key for key in (*ANGLES, "yaw") if key in rows]
+    if settings.robot is not None:
+        for missing in (key for key in ANGLES if key not in angles):
+            raise InputError(
+                f"{log.path}: which column is the robot's {missing}? Name it by "
+                f"`columns` {missing}=..."
+            )
+    elif angles:
+        warnings.append(
+            f"columns {', '.join(angles)} are left out; `robot_sigma` takes them for the robot's"
+        )
+        rows = {key: values for key, values in rows.items() if key not in angles}
+    if not len(log.forces):
+        raise InputError(f"{log.path}: no row of numbers")
+    for row in np.flatnonzero(np.isnan([*rows.values()]).any(axis=0)):
+        key = next(key for key in log.lacking(int(row)) if key in rows)
+        raise InputError(f"{log.path}: {log.describe(int(row), key)}, not a usable number")
+    if "time" in log.places and abs(log.start) < _YEARS:
+        rows["time"] = rows["time"] + log.start
+    return rows, warnings
+
+
+# --- The campaign of holds ------------------------------------------------------------------------
 
 
 def _campaign_of_holds(holds: Holds, reference: ReferenceLog | None) -> Imported:
