@@ -203,7 +203,7 @@ def test_whatever_the_text(tmp_path, rows, separator, timing, columns):
         log = open_log(path, columns=columns, **timing)
         assert len(log.time) == len(log.forces)
         assert np.isfinite(log.forces).all()
-        find_holds([log], ImportSettings(shortest_s=0.1, window_s=0.5))
+        find_holds(log, ImportSettings(shortest_s=0.1, window_s=0.5))
     except InputError as error:  # nothing else passes
         message = str(error)
     assert len(message.splitlines()) <= 1

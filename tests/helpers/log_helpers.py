@@ -64,7 +64,7 @@ def opened(folder, forces, time=None, **options):
 
 
 def find_holds(log, **options):
-    return detection.find_holds([log], parse_settings(options))[0]
+    return detection.find_holds(log, parse_settings(options))
 
 
 # --- 50 numbered rows ----------------------------------------------------------------------------

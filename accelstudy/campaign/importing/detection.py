@@ -1,6 +1,6 @@
 """Static holds of a log: runs of samples at rest, or blocks of which each is a position.
 
-A hold is a run of samples about which the windows of all sensors are at rest.
+A hold is a run of samples about which the windows are at rest.
 """
 
 from __future__ import annotations
@@ -133,89 +133,65 @@ def hold_table(log: Recording, holds: Mapping[int, slice]) -> pd.DataFrame:
 # --- Runs at rest, and blocks --------------------------------------------------------------------
 
 
-def find_holds(
-    logs: Sequence[Recording], settings: ImportSettings, one_each: bool = False
-) -> list[Holds]:
-    """Find the static holds of sensors that were turned together.
+def find_holds(log: Recording, settings: ImportSettings, one_each: bool = False) -> Holds:
+    """Find the static holds of a log, each of which begins and ends half a window inside a rest.
 
-    The sensors are on one body. So a hold is where all of them rest, and has the same number for
-    all. It begins and ends half a window inside the samples at rest.
+    Rests in which the sensor is saturated, or turns, are left out.
 
     Parameters
     ----------
-    logs : sequence of Recording, one for each sensor, of simultaneous samples
+    log : Recording
     settings : ImportSettings, of which those of the holds count
-    one_each : bool, whether the logs have several recordings with one position each: the longest
+    one_each : bool, whether the log has several recordings with one position each: the longest
         hold, which gets the number of the recording
-
-    Returns
-    -------
-    list of Holds
-        For each sensor, with the same numbers; those in which it is saturated, or turns, are left
-        out of its own.
 
     Raises
     ------
     InputError
-        If a log cannot be read, is shorter than a window, nothing in it is at rest, or the sensor
-        was never still.
+        If the log is shorter than a window, nothing in it is at rest, or the sensor was never
+        still.
     """
-    seconds = settings.window_s or usual_window(logs[0])
-    windows = [Windows.lasting(log, seconds) for log in logs]
-    thresholds = [each.threshold(settings.threshold_mps2) for each in windows]
-    limits = [threshold.sd for threshold in thresholds]
-    runs, too_short = _runs_at_rest(windows, limits, seconds, settings)
-    unfit = [
-        _unfit(each, runs, limit, settings.full_range)
-        for each, limit in zip(windows, limits, strict=True)
-    ]
-    numbers = dict(enumerate(range(len(runs)), 1))
-    if one_each:
-        part, useless = logs[0].part, set(unfit[0]).intersection(*unfit)
-        last_is_best = sorted(
-            numbers.values(), key=lambda i: (i not in useless, runs[i].stop - runs[i].start)
-        )
-        numbers = dict(sorted({int(part[runs[i].start]) + 1: i for i in last_is_best}.items()))
-    result = []
-    for each, threshold, reasons in zip(windows, thresholds, unfit, strict=True):
-        left_out = {n: reasons[i] for n, i in numbers.items() if i in reasons}
-        why = Counter(left_out.values())
-        lost = [f"{plural(count, 'hold')} left out: {reason}" for reason, count in why.items()]
-        warnings = [*each.warnings(), *lost, *too_short]
-        if len(left_out) == len(numbers):
-            if TURNS in why:
-                raise _never_still(each, "it turns slowly in all that looks like a hold", seconds)
-            raise InputError(
-                f"{each.log.path}: no static hold of {settings.shortest_s:g} s or more (a window "
-                f"is at rest up to {threshold.sd:.3g} m/s²)" + "".join(f"; {w}" for w in warnings)
-            )
-        holds = {n: runs[i] for n, i in numbers.items()}
-        result.append(_holds_of(each, threshold, holds, warnings, settings, left_out))
-    return result
-
-
-def _unfit(
-    windows: Windows, runs: Sequence[slice], limit: float, full_range: float
-) -> dict[int, str]:
-    """Places of the runs at rest that are no holds of a sensor, and why."""
-    full = find_saturated(windows, runs, full_range)
+    seconds = settings.window_s or usual_window(log)
+    windows = Windows.lasting(log, seconds)
+    threshold = windows.threshold(settings.threshold_mps2)
+    runs, too_short = _runs_at_rest(windows, threshold.sd, seconds, settings)
+    full = find_saturated(windows, runs, settings.full_range)
     # A sensor that turns slowly is nearly still in each window, yet has no constant attitude: its
     # force changes over the run by more than within each of them.
-    turns = [scatter(windows.log.forces[run]) > MAX_WANDER * limit for run in runs]
+    turns = [scatter(log.forces[run]) > MAX_WANDER * threshold.sd for run in runs]
     reasons = {i: TURNS for i, turning in enumerate(turns) if turning}
-    return reasons | {i: SATURATED for i, saturated in enumerate(full) if saturated}
+    reasons |= {i: SATURATED for i, saturated in enumerate(full) if saturated}
+    numbers = dict(enumerate(range(len(runs)), 1))
+    if one_each:
+        part = log.part
+        last_is_best = sorted(
+            numbers.values(), key=lambda i: (i not in reasons, runs[i].stop - runs[i].start)
+        )
+        numbers = dict(sorted({int(part[runs[i].start]) + 1: i for i in last_is_best}.items()))
+    left_out = {n: reasons[i] for n, i in numbers.items() if i in reasons}
+    why = Counter(left_out.values())
+    lost = [f"{plural(count, 'hold')} left out: {reason}" for reason, count in why.items()]
+    warnings = [*windows.warnings(), *lost, *too_short]
+    if len(left_out) == len(numbers):
+        if TURNS in why:
+            raise _never_still(windows, "it turns slowly in all that looks like a hold", seconds)
+        raise InputError(
+            f"{log.path}: no static hold of {settings.shortest_s:g} s or more (a window "
+            f"is at rest up to {threshold.sd:.3g} m/s²)" + "".join(f"; {w}" for w in warnings)
+        )
+    holds = {n: runs[i] for n, i in numbers.items()}
+    return _holds_of(windows, threshold, holds, warnings, settings, left_out)
 
 
 def _runs_at_rest(
-    windows: Sequence[Windows], limits: Sequence[float], seconds: float, settings: ImportSettings
+    windows: Windows, limit: float, seconds: float, settings: ImportSettings
 ) -> tuple[list[slice], list[str]]:
-    """Samples that are at rest for long enough in windows of all sensors, up to sds in m/s².
+    """Samples that are at rest for long enough, in windows up to an sd in m/s².
 
     Also a line about rests that are too short, with the option that takes them.
     """
-    step, shortest = windows[0].log.step, settings.shortest_s
-    quiet = [each.variance <= sd**2 for each, sd in zip(windows, limits, strict=True)]
-    still = np.all(quiet, axis=0)
+    step, shortest = windows.log.step, settings.shortest_s
+    still = windows.variance <= limit**2
     edges = np.flatnonzero(np.diff(still, prepend=False, append=False)).reshape(-1, 2)
     cut, least = round(settings.trim_s / step), max(2, round(shortest / step))
     rests = edges + np.array([cut, -cut])
@@ -224,7 +200,7 @@ def _runs_at_rest(
     short = (lengths >= MIN_REST) & (lengths < least)
     if not short.any():
         return runs, []
-    rests_s = (lengths[short] + 2 * cut + windows[0].width) * step
+    rests_s = (lengths[short] + 2 * cut + windows.width) * step
     lost = seconds + 2 * settings.trim_s
     spans = sorted({f"{rests_s.min():.1f}", f"{rests_s.max():.1f}"}, key=float)
     left = (float(rests_s.min()) - lost) * (1 + 1e-9)

@@ -18,7 +18,7 @@ from accelstudy.campaign.header import LogLayout, Place
 from accelstudy.campaign.importing.detection import Holds, find_blocks, find_holds
 from accelstudy.campaign.importing.names import thermometers
 from accelstudy.campaign.importing.noise import sigma_text, steps_text
-from accelstudy.campaign.importing.recording import AXES, SDS, Recording, SensorLog, read_log
+from accelstudy.campaign.importing.recording import SDS, Recording, SensorLog, read_log
 from accelstudy.campaign.importing.settings import ImportSettings, named_after
 from accelstudy.campaign.importing.sources import LogFile, Source, open_source
 from accelstudy.campaign.importing.windows import usual_window
@@ -49,67 +49,46 @@ def import_log(
     settings: ImportSettings | None = None,
     reference: ReferenceLog | None = None,
 ) -> Imported:
-    """Import the log, the logs, or the table of means of one sensor; see `import_sensors`."""
-    settings = settings or ImportSettings()
-    if settings.sensors:
-        raise InputError("sensors: several sensors make several campaigns; give the columns of one")
-    paths = [path] if isinstance(path, LogFile) else path
-    return import_sensors(paths, settings, reference)[""]
-
-
-def import_sensors(
-    paths: Sequence[LogFile], settings: ImportSettings, reference: ReferenceLog | None = None
-) -> dict[str, Imported]:
-    """Find the static holds of the sensors in a log, or in logs of one position each.
+    """Find the static holds of the sensor in a log, or in logs of one position each.
 
     If the settings say so, it is a table of means instead.
 
     Parameters
     ----------
-    paths : raw logs, see `read_log`; if there are several, the longest hold of each is
+    path : raw logs, see `read_log`; if there are several, the longest hold of each is
         its one position
     settings : ImportSettings
     reference : ReferenceLog, optional, of a calibrated sensor on the same plate, whose roll and
-        pitch the campaigns get
+        pitch the campaign gets
 
     Returns
     -------
-    dict
-        For each sensor, by its name ("" if the settings name none), the campaign and its holds,
-        None of a table of means. The campaign has one position for each hold. Its `sigma_force`
-        takes into account that samples are not independent: it is the Allan deviation over a
-        typical hold. It is taken along gravity only, since a sensor that settles makes the force
-        drift across it. Its `notes` and `warnings` tell of the import.
+    campaign : Campaign
+        It has one position for each hold. Its `sigma_force` takes into account that samples are
+        not independent: it is the Allan deviation over a typical hold. It is taken along gravity
+        only, since a sensor that settles makes the force drift across it. Its `notes` and
+        `warnings` tell of the import.
+    holds : Holds, or None of a table of means
 
     Raises
     ------
     InputError
         If a log cannot be read or has no static hold.
     """
+    paths = [path] if isinstance(path, LogFile) else path
+    settings, several = settings or ImportSettings(), len(paths) > 1
     _check_kinds(len(paths), settings, reference)
     settings = named_after(settings, paths)
     files = [open_source(path, settings.variable) for path in paths]
     if settings.means:
-        return {"": (_campaign_of_means(files[0], settings), None)}
-    of_sensors, several = _settings_of_sensors(settings), len(paths) > 1
+        return _campaign_of_means(files[0], settings), None
     untimed = several or settings.block is not None
-    parts = {
-        name: [read_log(file, each, untimed=untimed) for file in files]
-        for name, each in of_sensors.items()
-    }
-    logs = {
-        name: Recording(own, [parts[other] for other in parts if other != name])
-        for name, own in parts.items()
-    }
-    if settings.block is not None or (
-        several and any(_whole_files(log, settings) for log in logs.values())
-    ):
-        found = [find_blocks(log, of_sensors[name]) for name, log in logs.items()]
+    log = Recording([read_log(file, settings, untimed=untimed) for file in files])
+    if settings.block is not None or (several and _whole_files(log, settings)):
+        holds = find_blocks(log, settings)
     else:
-        found = find_holds([*logs.values()], settings, one_each=several)
-    return {
-        name: _campaign_of_holds(holds, reference) for name, holds in zip(logs, found, strict=True)
-    }
+        holds = find_holds(log, settings, one_each=several)
+    return _campaign_of_holds(holds, reference)
 
 
 def write_imported(
@@ -131,40 +110,22 @@ def write_imported(
 
 
 def _check_kinds(files: int, settings: ImportSettings, reference: ReferenceLog | None) -> None:
-    """Check that means, blocks, several files, several sensors and a reference go together."""
+    """Check that means, blocks, several files and a reference go together."""
     means, block = settings.means, settings.block is not None
-    placed = settings.sensors and {*AXES} & settings.columns.keys()
     for wrong, text in (
         (means and reference, "a table of means (`means`) has no holds in time: leave out "
          "`reference_log`"),
-        (means and (files > 1 or settings.sensors), "a table of means is one file of one sensor"),
+        (means and files > 1, "a table of means is one file of one sensor"),
         (means and block, "a table of means (`means`) has a row for each position, no block "
          "(`block`)"),
         (settings.robot and not means, "robot (`robot_sigma`): its angles go with a table of means "
          "(`means`)"),
-        (placed, "columns: fx, fy and fz stand in sensors (`sensors`) already"),
         (reference and (block or files > 1), "`reference_log` goes with one log that has a time, "
          "not with several files or `block`"),
         (block and files > 1, f"a log of blocks (`block`) is one file, not {files}"),
     ):  # fmt: skip
         if wrong:
             raise InputError(text)
-
-
-def _settings_of_sensors(settings: ImportSettings) -> dict[str, ImportSettings]:
-    """Settings of each sensor, as if it were the only one."""
-    if not settings.sensors:
-        return {"": settings}
-    return {
-        name: settings.model_copy(
-            update={
-                "columns": {**dict(zip(AXES, places, strict=True)), **settings.columns},
-                "name": f"{settings.name}-{name}",
-                "sensor": settings.sensor or name,
-            }
-        )
-        for name, places in settings.sensors.items()
-    }
 
 
 def _whole_files(log: Recording, settings: ImportSettings) -> bool:
@@ -349,8 +310,6 @@ def _notes(
     """How a log was read, and what was found in it, a line each."""
     log = holds.log.first
     names = [name if log.source.named else f"column {name}" for name in log.source.names]
-    sensors = (holds.log.parts, *holds.log.others)
-    taken = {place for logs in sensors for place in logs[0].places.values()}
     time = holds.log.time[holds.windows.centred]
     return _lines(
         "notes",
@@ -358,7 +317,7 @@ def _notes(
         settings,
         used={"time": "", "temperature": ""} | {key: names[i] for key, i in log.places.items()},
         dated=log.places.get("time") in log.source.dates,
-        unused=[name for place, name in enumerate(names) if place not in taken],
+        unused=[name for place, name in enumerate(names) if place not in log.places.values()],
         heat=[names[place] for place in thermometers(log.source.names)],
         offset=offset,
         reference=reference,

@@ -333,8 +333,12 @@ class SensorLog:
         lost = {key for key, values in self.rows.items() if np.isnan(values[row])}
         return [key for key in self.places if named.get(key, key) in lost]
 
-    def describe(self, row: int, key: str) -> str:
-        """Say what stands in a row for "time", "fx", …; this reads the file again to find it."""
+    def describe(self, row: int, key: str | None = None) -> str:
+        """Say what stands in a row for "time", "fx", …, by default for the first that it lacks.
+
+        This reads the file again to find it.
+        """
+        key = key or self.lacking(row)[0]
         place = self.places[key]
         where, cell = self.source.look_up(row, place)
         return f"{where}, column {self.source.names[place]} ({key}): {cell}"
@@ -367,12 +371,10 @@ class Recording:
     Parameters
     ----------
     parts : sequence of SensorLog
-    others : sequence of sequences of SensorLog, of the sensors in the same files; a row that lacks
-        a reading of one sensor is no row of any
 
     Attributes
     ----------
-    parts, others
+    parts
     first : SensorLog, which has the layout of all
     path : Path, first of the files
     step : float, s, usual time between two samples: the mean, without gaps. Steps may jitter or be
@@ -394,15 +396,10 @@ class Recording:
         reading.
     """
 
-    def __init__(
-        self, parts: Sequence[SensorLog], others: Sequence[Sequence[SensorLog]] = ()
-    ) -> None:
-        self.parts, self.others, self.first = parts, others, parts[0]
+    def __init__(self, parts: Sequence[SensorLog]) -> None:
+        self.parts, self.first = parts, parts[0]
         self.path = self.first.path
-        sensors = zip(parts, *others, strict=True)
-        self._lost = [np.any([log.lost for log in logs], axis=0) for logs in sensors]
-        self._used = [~lost if lost.any() else slice(None) for lost in self._lost]
-        times = [self._checked_time(i) for i in range(len(parts))]
+        times = [_checked_time(part, alone=len(parts) == 1) for part in parts]
         self.step = self._usual_step(times)
         firsts = [time[0] for time in times]
         self.starts = np.array([part.start for part in parts]) + firsts
@@ -431,42 +428,13 @@ class Recording:
     @property
     def row(self) -> NDArray[np.int_]:
         """Number of the row of each sample in its part, from 0, (n,)."""
-        return self._concatenate([np.arange(len(lost)) for lost in self._lost])
+        return self._concatenate([np.arange(len(part.lost)) for part in self.parts])
 
-    def _concatenate(self, parts: Sequence[NDArray[Any]]) -> NDArray[Any]:
+    def _concatenate(self, columns: Sequence[NDArray[Any]]) -> NDArray[Any]:
         """Columns of the parts, (..., n) each, without the rows that lack a reading."""
-        whole = [part[..., used] for part, used in zip(parts, self._used, strict=True)]
+        each = zip(columns, self.parts, strict=True)
+        whole = [values[..., ~part.lost] if part.lost.any() else values for values, part in each]
         return np.concatenate(whole, axis=-1) if whole[1:] else whole[0]
-
-    def _checked_time(self, i: int) -> Array:
-        """Times in a part of its rows that lack nothing, (n,), which are checked."""
-        part, lost, used = self.parts[i], self._lost[i], self._used[i]
-        time = part.rows.get("time", np.arange(float(len(lost))))[used]
-        place = part.places.get("time")
-        backward = np.diff(time) <= 0
-        if place is not None and backward.any():
-            row = int(np.flatnonzero(~lost)[1 + np.argmax(backward)])
-            where, cell = part.source.look_up(row, place)
-            raise InputError(
-                f"{part.path}: {where}, column {part.source.names[place]} (time): time does not "
-                f"increase ({cell}); the rate (`rate`) does without it"
-            )
-        if lost.sum() > MAX_BAD_SHARE * len(lost):
-            said, key = self._describe(i, int(np.argmax(lost)))
-            hint = "; give the rate (`rate`) instead" if key == "time" else ""
-            raise InputError(
-                f"{part.path}: {said}, not a usable number{hint}; {lost.sum()} of "
-                f"{plural(len(lost), 'row')} lack one, which are too many"
-            )
-        if len(lost) < 2 or (place is not None and len(time) < 2):
-            raise InputError(f"{part.path}: too few samples ({len(time)})")
-        # In a single position, a channel of a coarse sensor may be constant.
-        constant = [bool((force == force[0]).all()) for force in part.forces[used].T]
-        if len(self.parts) == 1 and any(constant):
-            place = min(part.layout.axes.order[np.array(constant)])
-            name = part.source.names[part.places[AXES[place]]]
-            raise InputError(f"{part.path}: column {name} ({AXES[place]}) is constant")
-        return time
 
     def _usual_step(self, times: Sequence[Array]) -> float:
         """Usual time between two samples, s, which is that of all parts."""
@@ -484,24 +452,18 @@ class Recording:
             )
         return float(np.mean(steps))
 
-    def _describe(self, part: int, row: int) -> tuple[str, str]:
-        """What stands in a row for the first reading that it lacks, and the key of that."""
-        log = next(logs[part] for logs in (self.parts, *self.others) if logs[part].lost[row])
-        key = log.lacking(row)[0]
-        return log.describe(row, key), key
-
     def warnings(self) -> list[str]:
         """What could not be read."""
         said: list[str] = []
-        for i, (part, lost) in enumerate(zip(self.parts, self._lost, strict=True)):
+        for part in self.parts:
             said += part.source.warnings
-            if lost.any():
-                rows = np.flatnonzero(lost)
-                each = "; ".join(self._describe(i, int(row))[0] for row in rows[:MAX_NAMED])
+            if part.lost.any():
+                rows = np.flatnonzero(part.lost)
+                each = "; ".join(part.describe(row) for row in rows[:MAX_NAMED].tolist())
                 more = "; …" if len(rows) > MAX_NAMED else ""
                 said.append(
-                    f"{len(rows)} of {plural(len(lost), 'row')} left out, as a reading is missing "
-                    f"or absurd: {each}{more}"
+                    f"{len(rows)} of {plural(len(part.lost), 'row')} left out, as a reading is "
+                    f"missing or absurd: {each}{more}"
                 )
         return said
 
@@ -518,6 +480,37 @@ class Recording:
             f"; if its times are in {unit}, there are {rates[unit]:.4g} samples per second: give "
             f"`time_unit` {unit}"
         )
+
+
+def _checked_time(part: SensorLog, alone: bool) -> Array:
+    """Times in a log of its rows that lack nothing, (n,), which are checked."""
+    lost, place = part.lost, part.places.get("time")
+    used = ~lost if lost.any() else slice(None)
+    time = part.rows.get("time", np.arange(float(len(lost))))[used]
+    backward = np.diff(time) <= 0
+    if place is not None and backward.any():
+        row = int(np.flatnonzero(~lost)[1 + np.argmax(backward)])
+        where, cell = part.source.look_up(row, place)
+        raise InputError(
+            f"{part.path}: {where}, column {part.source.names[place]} (time): time does not "
+            f"increase ({cell}); the rate (`rate`) does without it"
+        )
+    if lost.sum() > MAX_BAD_SHARE * len(lost):
+        row = int(np.argmax(lost))
+        hint = "; give the rate (`rate`) instead" if part.lacking(row)[0] == "time" else ""
+        raise InputError(
+            f"{part.path}: {part.describe(row)}, not a usable number{hint}; {lost.sum()} of "
+            f"{plural(len(lost), 'row')} lack one, which are too many"
+        )
+    if len(lost) < 2 or (place is not None and len(time) < 2):
+        raise InputError(f"{part.path}: too few samples ({len(time)})")
+    # In a single position, a channel of a coarse sensor may be constant.
+    constant = [bool((force == force[0]).all()) for force in part.forces[used].T]
+    if alone and any(constant):
+        axis = AXES[min(part.layout.axes.order[np.array(constant)])]
+        name = part.source.names[part.places[axis]]
+        raise InputError(f"{part.path}: column {name} ({axis}) is constant")
+    return time
 
 
 def usual_step(steps: Array) -> float:

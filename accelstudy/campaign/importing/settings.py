@@ -12,14 +12,13 @@ from pydantic import Field, model_validator
 
 from accelstudy.basics.errors import InputError
 from accelstudy.basics.units import STANDARD_GRAVITY
-from accelstudy.campaign.header import LogLayout, Place
+from accelstudy.campaign.header import LogLayout
 from accelstudy.campaign.importing.sources import LogFile
 from accelstudy.files.reading import overlay, read_layer
 from accelstudy.files.validation import (
     ConfigSection,
     Gravity,
     NotNegative,
-    PathName,
     Positive,
     SigmaAngle,
     SigmaGravity,
@@ -52,6 +51,7 @@ class ImportSettings(LogLayout):
     retired: ClassVar = {
         **LogLayout.retired,
         "join": "holds in one attitude are positions each",
+        "sensors": "import each of them by its `columns`, with a `name` of its own",
     }
 
     means: bool = Field(False, description="the file is a table of means already")
@@ -60,9 +60,6 @@ class ImportSettings(LogLayout):
     )
     name: str | None = Field(None, description="name of the campaign; that of the file if absent")
     sensor: str | None = Field(None, description="what was calibrated")
-    sensors: dict[PathName, Annotated[list[Place], Field(min_length=3, max_length=3)]] = Field(
-        {}, description="several sensors of one log: name, and columns of its x, y, z"
-    )
     gravity: GravitySettings = GravitySettings()
     robot: RobotSettings | None = Field(None, description="with means: the robot's angles")
     range_mps2: Annotated[Positive, _LARGE] | None = Field(
