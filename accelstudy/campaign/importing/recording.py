@@ -299,11 +299,13 @@ class SensorLog:
         rows, start, count = {}, np.nan, len(values["fx"])
         if "time" in values:
             time, start = _counted_from_first(values["time"])
-            time = self.time_factor * _usable(time)
+            time = _usable(time)
+            time *= self.time_factor
             if "nanoseconds" in values:
                 time += 1e-9 * _usable(values["nanoseconds"])
             first = next(iter(time[np.isfinite(time)]), 0.0)
-            rows["time"], start = time - first, start * self.time_factor + first
+            time -= first
+            rows["time"], start = time, start * self.time_factor + first
         elif self.layout.rate_hz is not None:
             rows["time"] = np.arange(count) / self.layout.rate_hz
         frame, conversion, forces = self.layout.axes, self.conversion, np.empty((3, count))
@@ -360,8 +362,11 @@ def _usable(values: NDArray[Any], largest: float = MAX_VALUE) -> Array:
 
     An array of floats is changed itself, unless nothing may write to it.
     """
+    absurd = ~((values >= -largest) & (values <= largest))
+    if not absurd.any():
+        return np.asarray(values, dtype=float)
     numbers = np.require(values, float, "W")
-    numbers[~(np.abs(numbers) <= largest)] = np.nan
+    numbers[absurd] = np.nan
     return numbers
 
 

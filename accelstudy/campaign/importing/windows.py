@@ -33,6 +33,8 @@ MAX_COARSE_RATIO = 1.75
 """Noise of windows, as a multiple of that of rounding, up to which a sensor at rest may read the
 same number all the time: that of noise of 0.4 steps."""
 
+_TOGETHER = 2**16
+"""Windows that are worked out together: what a processor keeps at hand is small."""
 _BINS = np.linspace(-40.0, 40.0, 4001)  # decades of variance
 
 
@@ -183,14 +185,17 @@ def usual_window(log: Recording) -> float:
 
 def window_variance(forces: Array, width: int) -> tuple[Array, NDArray[np.bool_]]:
     """Norm of the variances of the axes about each sample, (n,), and where an axis is constant."""
-    squares, constant = np.zeros(len(forces)), np.zeros(len(forces), dtype=bool)
-    half = width // 2
-    for force in forces.T:
-        squares += pd.Series(force).rolling(width, center=True).var(ddof=0).to_numpy() ** 2
+    variance, constant = np.full(len(forces), np.nan), np.zeros(len(forces), dtype=bool)
+    for first in range(0, len(forces) - width + 1, _TOGETHER):
+        block = forces[first : first + _TOGETHER + width - 1]
+        ends, count = slice(width - 1, None), len(block) - width + 1
+        middle = slice(first + width // 2, first + width // 2 + count)
+        of_axes = pd.DataFrame(block).rolling(width).var(ddof=0).to_numpy()[ends]
+        variance[middle] = np.sqrt(np.sum(of_axes**2, axis=1))
         # Rounding may hide a variance of zero, so changes are counted.
-        changes = np.cumsum(np.diff(force, prepend=force[:1]) != 0)
-        constant[half : len(force) - half] |= changes[2 * half :] == changes[: -2 * half]
-    return np.sqrt(squares), constant
+        changes = np.cumsum(np.diff(block, axis=0, prepend=block[:1]) != 0, axis=0)
+        constant[middle] = np.any(changes[ends] == changes[:count], axis=1)
+    return variance, constant
 
 
 def _noise_floor(variance: Array) -> float:
