@@ -20,8 +20,8 @@ from accelstudy.basics import bounds
 from accelstudy.basics.bounds import Range
 from accelstudy.basics.dates import read_date
 from accelstudy.basics.units import CLOCK_UNITS, GON, SENSOR_UNITS
-from accelstudy.campaign.importing.names import parse_unit
 from accelstudy.campaign.reference import ReferenceSensor
+from accelstudy.campaign.unit_spellings import parse_unit
 from accelstudy.files.validation import (
     ConfigSection,
     Finite,

@@ -54,8 +54,8 @@ def read_log(
         If there is no such file, or a value is wrong.
     """
     given = {**locals()}
+    from accelstudy.campaign.importing.formats import open_source
     from accelstudy.campaign.importing.log import log_of
-    from accelstudy.campaign.importing.sources import open_source
 
     read = log_of(log, given)
     open_source(read.file, read.layout.get("variable"))

@@ -9,7 +9,7 @@ from calling import refused
 
 from accelstudy.basics.errors import InputError
 from accelstudy.campaign.calibration.sensor_calibration import read_calibration
-from accelstudy.campaign.importing.sources import open_source
+from accelstudy.campaign.importing.formats import open_source
 from accelstudy.files import reading
 from accelstudy.files.parquet import whole_parquet
 from accelstudy.files.reading import read_layer

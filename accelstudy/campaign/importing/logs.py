@@ -16,11 +16,12 @@ from accelstudy.campaign.format import write_campaign
 from accelstudy.campaign.gross_errors.recognition import check_plausible
 from accelstudy.campaign.header import LogLayout, Place
 from accelstudy.campaign.importing.detection import Holds, find_blocks, find_holds
+from accelstudy.campaign.importing.formats import open_source
 from accelstudy.campaign.importing.names import thermometers
 from accelstudy.campaign.importing.noise import sigma_text, steps_text
 from accelstudy.campaign.importing.recording import SDS, Recording, SensorLog, read_log
 from accelstudy.campaign.importing.settings import ImportSettings, named_after
-from accelstudy.campaign.importing.sources import LogFile, Source, open_source
+from accelstudy.campaign.importing.sources import LogFile, Source
 from accelstudy.campaign.importing.windows import usual_window
 from accelstudy.campaign.session import Campaign
 from accelstudy.sensors.conversion import Conversion, conversion_of

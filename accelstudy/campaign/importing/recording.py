@@ -21,8 +21,9 @@ from accelstudy.basics.errors import InputError, UnknownNameError
 from accelstudy.basics.units import CLOCK_UNITS, SENSOR_UNITS, UNITS
 from accelstudy.basics.wording import plural, short_list
 from accelstudy.campaign.header import LogLayout, Place
+from accelstudy.campaign.importing.formats import open_source
 from accelstudy.campaign.importing.names import places_by_name, unit_in, without_unit
-from accelstudy.campaign.importing.sources import LogFile, Source, open_source
+from accelstudy.campaign.importing.sources import LogFile, Source
 from accelstudy.files.reading import overlay
 from accelstudy.sensors.conversion import MAX_VALUE, Conversion, conversion_of
 

@@ -1,4 +1,4 @@
-"""Tables of numbers as they stand in their files, which are opened here, whatever their format."""
+"""Tables of numbers as they stand in their files, MATLAB or in memory."""
 
 from __future__ import annotations
 
@@ -15,13 +15,8 @@ from numpy.typing import NDArray
 from accelstudy.basics.errors import InputError, UnknownNameError, printable
 from accelstudy.basics.wording import one_line
 from accelstudy.campaign.importing.names import layout_by_names
-from accelstudy.files.parquet import whole_parquet
 from accelstudy.files.reading import readable
 
-_CONTROLS = re.compile(rb"[\x01-\x08\x0e-\x1a\x1c-\x1f]")
-"""Bytes that no text has, in UTF-16 either."""
-_NO_TABLE = re.compile(rb"BZh|%PDF|(\xef\xbb\xbf)?\s*[\[{]\s*[\[{\"}]")
-"""What files begin with that look like text: an archive, a document, JSON."""
 _IS_NUMBER = re.compile("double|single|u?int[0-9]+")  # classes of MATLAB arrays
 _CLOCK = r"\d{1,2}:\d\d(:\d\d([.,:]\d+)?)?"
 _ISO = r"\d{4}-?\d\d-?\d\d[T ]\d\d(:?\d\d.*)?"
@@ -129,50 +124,6 @@ LogFile = str | Path | Source
 """Where a log is: the path of a file, or a table in memory."""
 
 
-def open_source(path: LogFile, variable: str | None = None) -> Source:
-    """Open a file of numbers, by its ending and its first bytes; a new format is one line here.
-
-    Parameters
-    ----------
-    path : file, or a table in memory, which is a source already; a pipe is none, since a log is
-        read more than once
-    variable : str, which array of a MATLAB file, topic of a bag or sensor of a flight log
-    """
-    if isinstance(path, Source):
-        return path
-    from accelstudy.campaign.importing import bags
-    from accelstudy.campaign.importing.text import GZIP, TextSource
-
-    path = Path(path)
-    with readable(path):
-        if (path / bags.BAG_OF_FOLDER).is_file():
-            return bags.open_bag(path, variable)
-        if not (path.is_file() or path.is_dir()) and path.stat():
-            raise InputError(
-                f"{path}: a pipe or a device, and a log is read more than once; save it in a file"
-            )
-        with path.open("rb") as file:
-            start = file.read(128)
-    if not start:
-        raise InputError(f"{path}: the file is empty")
-    if path.suffix.lower() in (".parquet", ".pq"):
-        with whole_parquet(path) as parquet:
-            return Source(path, parquet.read())
-    # An ASCII .mat has no zero bytes; every binary one has some in its header.
-    if path.suffix.lower() == ".mat" and 0 in start:
-        return _open_matlab(path, variable)
-    if start.startswith(bags.BAGS):
-        return bags.open_bag(path, variable)
-    if start.startswith(bags.ULOG):
-        return bags.open_ulog(path, variable)
-    if not start.startswith(GZIP) and (_NO_TABLE.match(start) or _CONTROLS.search(start)):
-        raise InputError(
-            f"{path}: no text, MATLAB file up to version 7, Parquet, bag or ULog; unpack an "
-            "archive, and save a workbook or JSON as CSV, with a row for each sample"
-        )
-    return TextSource(path)
-
-
 def chosen_of(path: Path, what: str, found: Collection[str], wanted: str | None) -> str:
     """The one that is wanted, or the only one."""
     if wanted is not None and wanted not in found:
@@ -186,7 +137,7 @@ def chosen_of(path: Path, what: str, found: Collection[str], wanted: str | None)
     return next(iter(found)) if wanted is None else wanted
 
 
-def _open_matlab(path: Path, variable: str | None = None) -> Source:
+def open_matlab(path: Path, variable: str | None = None) -> Source:
     """Open a MATLAB file; it is read as a whole, since the format allows 2 GB at most."""
     from scipy.io import loadmat, whosmat
 
