@@ -20,11 +20,12 @@ from accelstudy.diagnosis.decision.functions import (
     weigh_place,
 )
 from accelstudy.diagnosis.decision.noise import exceeds_stated, judged_noise
-from accelstudy.diagnosis.decision.posterior import Alternatives, Case, Posterior
+from accelstudy.diagnosis.decision.posterior import Posterior
 from accelstudy.diagnosis.decision.problem import Problem, pose
 from accelstudy.diagnosis.decision.verdict import Finding
 from accelstudy.diagnosis.evidence.candidates import UNKNOWN, Cause, Projection
-from accelstudy.diagnosis.evidence.detection import draw_effects, log_ratio, total_odds
+from accelstudy.diagnosis.evidence.detection import draw_effects, log_ratio
+from accelstudy.diagnosis.evidence.size import log_mean
 from accelstudy.diagnosis.prediction import (
     Group,
     HeldOutGap,
@@ -70,16 +71,16 @@ class Gap:
         return "name" if len(self.names) == 1 else "effect"
 
 
-def gap_of(case: Case, finding: Finding, seeds: Sequence[np.random.SeedSequence]) -> Gap:
+def gap_of(problem: Problem, finding: Finding, seeds: Sequence[np.random.SeedSequence]) -> Gap:
     """Compare the models on the positions to which they were fitted, and on held-out ones.
 
     Parameters
     ----------
-    case : Case
+    problem : Problem
     finding : Finding
     seeds : of the split and of the simulated threshold
     """
-    base, final = case.problem.base.solution, finding.frame.solution
+    base, final = problem.base.solution, finding.frame.solution
     before = base.omega / base.redundancy
     if not finding.chosen:
         return Gap(before)
@@ -87,12 +88,14 @@ def gap_of(case: Case, finding: Finding, seeds: Sequence[np.random.SeedSequence]
     if finding.verdict == "gross_error":
         return gap
     with stage("held-out positions"):
-        return _predict(case, finding, gap, [np.random.default_rng(seed) for seed in seeds])
+        return _predict(problem, finding, gap, [np.random.default_rng(seed) for seed in seeds])
 
 
-def _predict(case: Case, finding: Finding, gap: Gap, rngs: Sequence[np.random.Generator]) -> Gap:
+def _predict(
+    problem: Problem, finding: Finding, gap: Gap, rngs: Sequence[np.random.Generator]
+) -> Gap:
     """Choose and fit on a part of the positions, and predict the rest."""
-    problem, first, place = case.problem, case.problem.base.solution, finding.place
+    first, place = problem.base.solution, finding.place
     n, c = len(first.misclosures), first.approach.n_conditions
     k = sum(cause.shape.dim for cause in finding.chosen)
     needed = int(np.ceil((first.design.shape[1] + k + 3) / c))
@@ -108,7 +111,7 @@ def _predict(case: Case, finding: Finding, gap: Gap, rngs: Sequence[np.random.Ge
         base = solve(first.model, first.approach, first.observed.take(fitted))
     except (InputError, np.linalg.LinAlgError):
         return replace(gap, reason="the fitted positions do not determine the model")
-    part = Alternatives(pose(replace(problem.base, solution=base)))
+    part = pose(replace(problem.base, solution=base))
     chosen, others = _chosen_alike(part, finding)
     refit = _refit(part, chosen, place)
     if isinstance(refit, str):
@@ -121,8 +124,8 @@ def _predict(case: Case, finding: Finding, gap: Gap, rngs: Sequence[np.random.Ge
         reason = f"the fitted positions alone would have chosen another {another}"
         return replace(gap, held_out=test, reason=reason)
     split = LinearSplit(problem.frame, fitted, held)
-    beyond = case.detection.threshold(RULES.level(known))
-    test = replace(test, needed=threshold(case, place, beyond, part.problem, split, rngs[1]))
+    beyond = problem.detection.threshold(RULES.level(known))
+    test = replace(test, needed=threshold(problem, place, beyond, part, split, rngs[1]))
     gap = replace(gap, held_out=test, confirmed=test.significant)
     alone = finding.verdict == "named" and len(finding.chosen) == 1
     # Of what leaves more than the noise the name may be that of something that is not listed.
@@ -130,13 +133,13 @@ def _predict(case: Case, finding: Finding, gap: Gap, rngs: Sequence[np.random.Ge
         return gap
     (cause,) = finding.chosen
     # What was found, and all that could leave the same in this campaign.
-    imitators = problem.examined.imitators(cause.shape)
+    imitators = problem.frame.imitators(cause.shape)
     names = tuple(dict.fromkeys((cause.name, *cause.members, *imitators)))
-    sure = _prefers(names, problem, part.problem, finding, split)
+    sure = _prefers(names, problem, part, finding, split)
     return replace(gap, names=names) if sure else gap
 
 
-def _chosen_alike(part: Alternatives, finding: Finding) -> tuple[Sequence[Cause], bool]:
+def _chosen_alike(part: Problem, finding: Finding) -> tuple[Sequence[Cause], bool]:
     """Effects of the credible set that a part chooses, and whether it would choose something else.
 
     Of a learned function they are what is certain beside it.
@@ -168,7 +171,7 @@ def _match(classes: Sequence[Sequence[str]], names: Sequence[str]) -> bool:
     )
 
 
-def _refit(part: Alternatives, chosen: Sequence[Cause], place: Place | None) -> Solution | str:
+def _refit(part: Problem, chosen: Sequence[Cause], place: Place | None) -> Solution | str:
     """Fit to a part with what was chosen, and a function of a place; or say why that cannot be."""
     alternatives = []
     for cause in chosen:
@@ -177,19 +180,19 @@ def _refit(part: Alternatives, chosen: Sequence[Cause], place: Place | None) -> 
             return f"the fitted positions alone cannot show {cause.name}"
         alternatives.append(Cause(shown[0], shown, part.singles.best[shown[0]]))
     if place is not None:
-        learned = fit_of_place(part.problem, place, [cause.shape for cause in alternatives])
+        learned = fit_of_place(part, place, [cause.shape for cause in alternatives])
         reason = "the fitted positions alone cannot show such a function"
         return reason if learned is None else learned[1]
     fit = part.refit(alternatives)
     return "the fit to the fitted positions alone has no solution" if fit is None else fit[1]
 
 
-def _place_of(part: Alternatives) -> Place | None:
+def _place_of(part: Problem) -> Place | None:
     """Place that a part chooses for something unknown, alone or beside effects."""
     alone = [one for one in part.alone if one.names == (UNKNOWN,)]
     if not alone:
         return None
-    found = most_probable_place(part.problem, Posterior.of([*alone, *part.with_unknown]))
+    found = most_probable_place(part, Posterior.of([*alone, *part.with_unknown]))
     return None if found is None else found.place
 
 
@@ -197,7 +200,6 @@ def _prefers(
     group: Sequence[str], problem: Problem, part: Problem, finding: Finding, split: LinearSplit
 ) -> bool:
     """Whether held-out positions by themselves prefer some names to the other explanations."""
-    assert finding.posterior is not None
     errors = problem.residuals.errors[None]
     missed = split.base_residuals(errors)[1]
     variance = 1.0 if part.evidence.level.known else part.residuals.variance
@@ -224,7 +226,7 @@ def _prefers(
 
 
 def threshold(
-    whole: Alternatives,
+    problem: Problem,
     place: Place | None,
     beyond: float,
     part: Problem,
@@ -235,34 +237,33 @@ def threshold(
 
     Parameters
     ----------
-    whole : Alternatives, of all positions
+    problem : Problem, of all positions
     place : Place, of which a function was learned in place of a name; None for a name
     beyond : float, total evidence from which on something counts as missing
     part : Problem, of the fitted positions
     split : LinearSplit
     rng : Generator
     """
-    problem, label = whole.problem, labels(whole.classes)
-    residuals, field = problem.residuals, problem.field
-    drawn = list[Shapes](field.named_shapes)
+    label, residuals, field = labels(problem.classes), problem.residuals, problem.field
+    drawn: Shapes = field.spaces
     if place is not None:
         if problem.unknown is None or part.unknown is None:
             return RULES.z_significant
-        drawn = [problem.unknown.at([place])]
-        if not len(drawn[0].dims):
+        drawn = problem.unknown.at([place])
+        if not len(drawn.dims):
             return RULES.z_significant
-    added = draw_effects(drawn, len(residuals.design), RULES.threshold_sets, rng)
+    added = draw_effects(drawn, RULES.threshold_sets, rng)
     noise = rng.standard_normal(added.shape) + residuals.project(added.T).T
     z = residuals.project(noise.T).T
     seen = field.project(z)
     odds = field.odds(problem.evidence, seen)
     claimed = (
-        claimed_place(problem, seen, place) if place else claimed_names(odds, field.names, label)
+        claimed_place(problem, z, seen, place) if place else claimed_names(odds, field.names, label)
     )
-    sets = np.flatnonzero((claimed >= 0) & (total_odds(odds) > beyond))
+    sets = np.flatnonzero((claimed >= 0) & (log_mean(odds) > beyond))
     if not len(sets):
         return RULES.z_significant
-    weights = np.exp(-log_ratio(drawn, [shapes.parts(z[sets]) for shapes in drawn]))
+    weights = np.exp(-log_ratio(drawn, drawn.parts(z[sets])))
     noise = noise[sets]
     found, change = (
         chosen_place(part, split, noise, place)
@@ -313,8 +314,9 @@ def chosen_names(
         for k in np.unique(candidate):
             if names[k] == OUTLIER:
                 continue
-            shapes, rows = field.named_shapes[k], np.flatnonzero(candidate == k)
-            logs = shapes.logs(part.evidence, seen.parts[k][rows], seen.squares[rows])
+            shapes, rows = field.candidates[names[k]], np.flatnonzero(candidate == k)
+            along = seen.parts[rows, field.starts[k] : field.starts[k + 1]]
+            logs = shapes.logs(part.evidence, along, seen.squares[rows])
             places, which = np.unique(np.argmax(logs, axis=1), return_inverse=True)
             tried = split.frame.columns([shapes[int(place)] for place in places])
             for i, columns in enumerate(tried):
@@ -324,15 +326,15 @@ def chosen_names(
     return found, split.corrections(noise, groups())
 
 
-def claimed_place(problem: Problem, seen: Projection, place: Place) -> Ints:
-    """Whether a function of a place would be learned of residuals, (b,): 0, or −1 if not."""
+def claimed_place(problem: Problem, z: Array, seen: Projection, place: Place) -> Ints:
+    """Whether a function of a place would be learned of residuals z (b, m): 0, or −1 if not."""
     field, evidence, unknown = problem.field, problem.evidence, problem.unknown
     assert unknown is not None
     prior = np.log(problem.prior_unknown)
     densities = field.densities(evidence, seen)
-    densities[:, :-1] -= np.log(len(field.named_shapes))
+    densities[:, :-1] -= np.log(len(field.candidates))
     densities[:, -1] += prior
-    of_place = unknown.place_densities(evidence, seen.parts[-1], seen.squares)[place]
+    of_place = unknown.place_densities(evidence, z)[place]
     return np.where(np.exp(of_place + prior - log_sum(densities)) >= RULES.sure, 0, -1)
 
 
@@ -342,7 +344,7 @@ def chosen_place(
     """Whether the fitted positions choose a place for noise (b, m), 0, and its corrections."""
     unknown, z = part.unknown, split.residuals(part.residuals, noise)
     assert unknown is not None
-    each = unknown.place_densities(part.evidence, unknown.parts(z), np.sum(z**2, axis=1))
+    each = unknown.place_densities(part.evidence, z)
     most = np.max([*each.values()], axis=0)
     found = np.where(each.get(place, np.full(len(z), -np.inf)) >= most, 0, -1)
     shapes = weigh_place(place, part.frame, part.residuals, z, part.evidence)

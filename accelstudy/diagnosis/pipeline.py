@@ -2,9 +2,9 @@
 
 1. Gross errors are recognised by their size, and mended (`recognise`).
 2. The base model is fitted (`fit_base`). Its residuals, and every effect, function and kind of
-   noise that the model may lack, are the problem (`pose`), and with the campaign a `Case`, whose
-   properties are computed when a stage asks for them: the test for anything that is missing, the
-   evidence for each explanation and for sets of up to three effects, the posterior.
+   noise that the model may lack, are the `Problem` (`pose`), whose properties are computed when a
+   stage asks for them: the test for anything that is missing, the evidence for each explanation and
+   for sets of up to three effects, the posterior.
 3. The evidence is judged by rules, of which the first that matches decides (`decide`).
 4. The effect is chosen and fitted again on a part of the positions, and the others confirm it, or
    do not, or refute it (`confirm`).
@@ -23,8 +23,7 @@ from accelstudy.campaign.gross_errors.recognition import recognise
 from accelstudy.campaign.session import Campaign
 from accelstudy.diagnosis.decision.functions import learn_function
 from accelstudy.diagnosis.decision.noise import tests_of_noise, worst_of
-from accelstudy.diagnosis.decision.posterior import Case
-from accelstudy.diagnosis.decision.problem import fit_base, is_exact, pose
+from accelstudy.diagnosis.decision.problem import Problem, fit_base, is_exact, pose
 from accelstudy.diagnosis.decision.verdict import (
     Finding,
     Reason,
@@ -34,7 +33,6 @@ from accelstudy.diagnosis.decision.verdict import (
     judge_noise,
     withdraw_refuted,
 )
-from accelstudy.diagnosis.evidence.detection import Chance
 from accelstudy.diagnosis.held_out import Gap, gap_of
 from accelstudy.diagnosis.result import CampaignDiagnosis
 from accelstudy.diagnosis.rules import RULES
@@ -67,13 +65,12 @@ def diagnose(
         campaign = recognised.corrected
     # A stream for each, so that none changes what another one draws.
     null, *others = (np.random.SeedSequence(seed, spawn_key=(key,)) for key in (0, 1, 4))
-    base = fit_base(campaign, model, approach)
-    case = Case(pose(base), campaign, Chance(null, len(base.solution.design)))
-    finding, gap = confirm(case, decide(case), others)
-    return CampaignDiagnosis(case, finding, gap, recognised)
+    problem = pose(fit_base(campaign, model, approach), null)
+    finding, gap = confirm(problem, decide(problem, campaign), others)
+    return CampaignDiagnosis(problem, campaign, finding, gap, recognised)
 
 
-def decide(case: Case) -> Finding:
+def decide(problem: Problem, campaign: Campaign) -> Finding:
     """Judge the evidence: the first of these rules that matches decides.
 
     * Only rounding errors are left: nothing is missing.
@@ -86,31 +83,30 @@ def decide(case: Case) -> Finding:
     * A test of the noise fails: the noise is not as it is said to be, or an effect looks like it.
     * Nothing is missing.
     """
-    problem = case.problem
     if is_exact(problem.base.solution):
         return Finding("no_effect", problem.frame, Reason.of("exact"))
     nothing = Finding("no_effect", problem.frame)
-    if case.detection.p_value < RULES.level(problem.evidence.level.known):
-        explained = explain(case)
-        finding = add_certain_effects(case, explained)
-        if finding.verdict != "unknown" or explained.posterior is None:
+    if problem.detection.p_value < RULES.level(problem.evidence.level.known):
+        explained = explain(problem)
+        finding = add_certain_effects(problem, explained)
+        if finding.verdict != "unknown":
             return finding
-        dismissed = dismiss_weak_evidence(case, finding)
+        dismissed = dismiss_weak_evidence(problem, finding)
         if dismissed is None:
-            return learn_function(case, explained.posterior, finding) or finding
+            return learn_function(problem, explained.posterior, finding) or finding
         nothing = dismissed
-    worst = worst_of(tests_of_noise(case, problem.frame))
-    return nothing if worst is None else add_certain_effects(case, judge_noise(case, worst))
+    worst = worst_of(tests_of_noise(problem, campaign, problem.frame))
+    return nothing if worst is None else add_certain_effects(problem, judge_noise(problem, worst))
 
 
 def confirm(
-    case: Case, finding: Finding, seeds: list[np.random.SeedSequence]
+    problem: Problem, finding: Finding, seeds: list[np.random.SeedSequence]
 ) -> tuple[Finding, Gap]:
     """Predict held-out positions; what they refute is withdrawn, and what is left is tried again.
 
     Parameters
     ----------
-    case : Case
+    problem : Problem
     finding : Finding
     seeds : of the split and of the simulated threshold
 
@@ -120,7 +116,7 @@ def confirm(
     gap : Gap, how far the disagreement shrinks, and whether that is confirmed
     """
     while True:
-        gap = gap_of(case, finding, seeds)
+        gap = gap_of(problem, finding, seeds)
         if gap.held_out is None or not gap.held_out.refutes:
             return finding, gap
-        finding = finding.without_function or withdraw_refuted(case, finding, gap.held_out)
+        finding = finding.without_function or withdraw_refuted(problem, finding, gap.held_out)

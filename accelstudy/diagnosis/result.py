@@ -27,7 +27,7 @@ from accelstudy.diagnosis.decision.noise import (
     tests_of_noise,
     worst_of,
 )
-from accelstudy.diagnosis.decision.posterior import Case, Explanation
+from accelstudy.diagnosis.decision.posterior import Explanation
 from accelstudy.diagnosis.decision.problem import Problem, is_exact
 from accelstudy.diagnosis.decision.refits import with_settings
 from accelstudy.diagnosis.decision.statement import Part
@@ -44,7 +44,6 @@ from accelstudy.diagnosis.held_out import Gap
 from accelstudy.diagnosis.next_positions import NextPosition, next_positions
 from accelstudy.diagnosis.rules import RULES
 from accelstudy.diagnosis.shape import LearnedShape, shape_of
-from accelstudy.diagnosis.space.examined import ExaminedFit
 from accelstudy.diagnosis.space.frame import SessionFit
 from accelstudy.diagnosis.space.hypotheses import OUTLIER
 from accelstudy.diagnosis.space.shapes import Place
@@ -131,31 +130,23 @@ class CampaignDiagnosis:
 
     Attributes
     ----------
-    case : Case, the campaign, with a recognised gross error mended, and the evidence
+    problem : Problem, the fit of the base model, all that it may lack, and the evidence
+    campaign : Campaign, with a recognised gross error mended
     finding : Finding
     gap : Gap, how far the disagreement shrinks by what was added
     recognised : Recognition or None, a gross error of unit, axes or order
     """
 
-    case: Case
+    problem: Problem
+    campaign: Campaign
     finding: Finding
     gap: Gap
     recognised: Recognition | None = None
 
     @property
-    def campaign(self) -> Campaign:
-        """Campaign with a recognised gross error mended."""
-        return self.case.campaign
-
-    @property
-    def problem(self) -> Problem:
-        """The fit of the base model, and all that it may lack."""
-        return self.case.problem
-
-    @property
     def detection(self) -> Detection:
         """Test whether anything is missing, of all candidates together."""
-        return self.case.detection
+        return self.problem.detection
 
     @property
     def base(self) -> Solution:
@@ -190,7 +181,7 @@ class CampaignDiagnosis:
     @property
     def invisible(self) -> tuple[str, ...]:
         """Effects that the parameters of the model absorb whatever their size."""
-        return self.problem.examined.invisible
+        return self.frame.tested.invisible
 
     # --- the verdict --------------------------------------------------------------------------
 
@@ -200,21 +191,21 @@ class CampaignDiagnosis:
         return self.finding.verdict if self.recognised is None else "gross_error"
 
     @cached_property
-    def reason(self) -> Reason | None:
-        """Reason of the verdict; None where it needs none."""
+    def reason(self) -> Reason:
+        """Reason of the verdict."""
         if self.recognised is not None:
             return Reason.of("recognised", reason=self.recognised.reason)
-        return reason_of_unrecorded(self.case, self.finding) or self.finding.reason
+        return reason_of_unrecorded(self.problem, self.finding) or self.finding.reason
 
     @cached_property
     def p_coloured(self) -> float:
         """Probability of coloured noise that may be an effect of an absent column."""
-        return p_coloured(self.case, self.finding)
+        return p_coloured(self.problem, self.finding)
 
     @property
     def code(self) -> str:
         """Code of the reason; empty if there is none."""
-        return "" if self.reason is None else self.reason.code
+        return self.reason.code
 
     @cached_property
     def credible_set(self) -> tuple[Explanation, ...]:
@@ -254,7 +245,6 @@ class CampaignDiagnosis:
     def _noise(self) -> NamedCause:
         """What is wrong with the noise."""
         worst, posterior = worst_of(self.noise_tests), self.finding.posterior
-        assert posterior is not None
         name = next(one.names[0] for one in posterior.reported if one.is_noise)
         # Of larger residuals the level says least; what they are, the evidence says.
         if worst is not None and not (worst.name == LEVEL and posterior.p_noise >= RULES.sure):
@@ -265,7 +255,7 @@ class CampaignDiagnosis:
     def _chosen(self) -> list[NamedCause]:
         """What was chosen, with its estimates."""
         solution, chosen = self.final.solution, self.finding.chosen
-        cofactors = with_settings(self.problem.examined, solution, [one.shape for one in chosen])
+        cofactors = with_settings(self.frame, solution, [one.shape for one in chosen])
         sigma = np.sqrt(np.diag(cofactors) * self.noise.variance).tolist()
         each = zip(solution.parameters.tolist(), sigma, strict=False)
         values = dict(zip(solution.model.parameter_names, each, strict=False))
@@ -276,7 +266,7 @@ class CampaignDiagnosis:
         self, cause: Cause, values: dict[str, tuple[float, float]], searched: Iterator[float]
     ) -> NamedCause:
         """Describe a cause by the values of all parameters, and sigmas of the log settings."""
-        best, members, examined = cause.shape, cause.members, self.problem.examined
+        best, members = cause.shape, cause.members
         p = self.detection.p_family[UNKNOWN if best.name == LEARNED else best.name]
         if best.place is not None:
             at = int(self.campaign.positions[best.place])
@@ -285,8 +275,8 @@ class CampaignDiagnosis:
         effect = best.distinguishable
         assert effect is not None
         # What is beside a large effect was found in what its refit leaves.
-        here = None if best.name == LEARNED else examined.hypothesis(best.effect)
-        like = () if here is None else examined.imitators(here)
+        (here,) = (None,) if best.name == LEARNED else self.frame.hypotheses((best.effect,))
+        like = () if here is None else self.frame.imitators(here)
         smooth = [s for s in best.effect.takes if s.name == best.smooth]
         of_logs = zip(smooth, searched, strict=False)
         return NamedCause(
@@ -309,7 +299,7 @@ class CampaignDiagnosis:
         """
         posterior, first = self.finding.posterior, dict[tuple[str, ...], str]()
         total: dict[str, float] = defaultdict(float)
-        for one in posterior.all if posterior else ():
+        for one in posterior.all:
             # Two bumped positions have one name.
             names = {first.setdefault(cause.members, cause.name): None for cause in one.causes}
             for name in names:
@@ -336,7 +326,7 @@ class CampaignDiagnosis:
     @cached_property
     def noise_tests(self) -> tuple[NoiseTest, ...]:
         """Tests of the noise on the residuals of the final fit."""
-        return tests_of_noise(self.case, self.final)
+        return tests_of_noise(self.problem, self.campaign, self.final)
 
     @property
     def sigma_position(self) -> float:
@@ -417,15 +407,13 @@ class CampaignDiagnosis:
         if finding.verdict == "narrowed":
             classes = [alike for one in finding.credible_set for alike in one.classes]
             names += [name for alike in classes for name in alike]
-        same = self.final is self.frame
-        examined = self.problem.examined if same else ExaminedFit.of(self.final)
-        return tuple(upper_limits(examined, self.noise.trusted, names))
+        return tuple(upper_limits(self.final, self.noise.trusted, names))
 
     @cached_property
     def next_positions(self) -> tuple[NextPosition, ...]:
         """Positions that tell the two most probable explanations apart."""
         finding = self.finding
-        if finding.posterior is None or finding.verdict not in ("named", "narrowed", "unknown"):
+        if finding.verdict not in ("named", "narrowed", "unknown"):
             return ()
         rivals = [one.best for one in finding.credible_set if one.is_effects]
         if len(rivals) < 2:

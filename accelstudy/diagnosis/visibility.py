@@ -17,7 +17,6 @@ from accelstudy.basics.wording import amount
 from accelstudy.campaign.calibration.fit import fit_campaign
 from accelstudy.campaign.session import Campaign
 from accelstudy.diagnosis.rules import RULES
-from accelstudy.diagnosis.space.examined import ExaminedFit, examine
 from accelstudy.diagnosis.space.frame import SessionFit
 from accelstudy.diagnosis.space.hypotheses import OUTLIER, Hypothesis, cosines
 from accelstudy.effects import Effect, get_effect
@@ -80,7 +79,7 @@ def whole_shapes(shapes: Iterable[Hypothesis]) -> list[Hypothesis]:
     return [h for h in shapes if h.effect is not None and h.dim == len(h.effect.parameters)]
 
 
-def upper_limits(examined: ExaminedFit, known: bool, named: Sequence[str]) -> list[UpperLimit]:
+def upper_limits(frame: SessionFit, known: bool, named: Sequence[str]) -> list[UpperLimit]:
     """95 % limits |p̂| + 1.96 σ of the parameters of all effects that were not found.
 
     Where the noise is not `known`, σ comes from what the model and the effect together leave of the
@@ -91,17 +90,17 @@ def upper_limits(examined: ExaminedFit, known: bool, named: Sequence[str]) -> li
     An effect without such a shape has no limit.
     """
     limits = []
-    for name, shapes in examined.candidates.items():
+    for name, shapes in frame.candidates.items():
         if name == OUTLIER or name in named:
             continue
-        whole = whole_shapes(shapes)
+        whole = whole_shapes(shapes.hypotheses)
         if not whole:
             continue
-        best = max(whole, key=lambda h: float(np.sum((examined.frame.residuals.z @ h.basis) ** 2)))
+        best = max(whole, key=lambda h: float(np.sum((frame.residuals.z @ h.basis) ** 2)))
         assert best.effect is not None
-        columns = signature_columns(examined.frame, best)
+        columns = signature_columns(frame, best)
         inverse = np.linalg.pinv(columns)
-        residuals = examined.frame.residuals
+        residuals = frame.residuals
         values, variance, needed = inverse @ residuals.z, 1.0, sigmas_95()
         if not known:
             left, r = residuals.z - columns @ values, residuals.redundancy - columns.shape[1]
@@ -115,7 +114,7 @@ def upper_limits(examined: ExaminedFit, known: bool, named: Sequence[str]) -> li
     return limits
 
 
-def visibilities(examined: ExaminedFit, alpha: float = 0.001) -> list[Visibility]:
+def visibilities(frame: SessionFit, alpha: float = 0.001) -> list[Visibility]:
     """What a campaign can show of each effect that is not in its model.
 
     The minimal detectable bias (MDB) is the size √(λ0 / dᵀd) of a single parameter at which its
@@ -127,18 +126,21 @@ def visibilities(examined: ExaminedFit, alpha: float = 0.001) -> list[Visibility
     """
     root = np.sqrt(noncentrality(1, alpha, POWER))
     rows = []
-    for name, shapes in examined.candidates.items():
+    for name, shapes in frame.candidates.items():
         if name == OUTLIER:
             continue
-        judged = whole_shapes(shapes) or [*shapes]
-        columns = [signature_columns(examined.frame, h) for h in judged]
+        judged = whole_shapes(shapes.hypotheses) or shapes.hypotheses
+        columns = [signature_columns(frame, h) for h in judged]
         sizes = [np.linalg.norm(c, axis=0) for c in columns]
         mdbs = [_size(root, s) for s in sizes]
         easiest = int(np.argmin(mdbs))
         best = judged[easiest]
-        near = examined.nearest(best)
+        near = frame.nearest(best)
         rivals = [
-            max(examined.candidates[other], key=lambda h: float(cosines(best.ideal, h.ideal)[0]))
+            max(
+                frame.candidates[other].hypotheses,
+                key=lambda h: float(cosines(best.ideal, h.ideal)[0]),
+            )
             for other, cosine in near
             if cosine <= RULES.alike
         ]
@@ -156,8 +158,8 @@ def visibilities(examined: ExaminedFit, alpha: float = 0.001) -> list[Visibility
                 easiest=best.effect,
             )
         )
-    rows += [Visibility(name, "invisible") for name in examined.invisible]
-    rows += [Visibility(name, "untestable", why) for name, why in examined.untestable.items()]
+    rows += [Visibility(name, "invisible") for name in frame.tested.invisible]
+    rows += [Visibility(name, "untestable", why) for name, why in frame.tested.untestable.items()]
     return sorted(rows, key=lambda row: row.name)
 
 
@@ -168,7 +170,7 @@ def _size(root: float, signature_norms: Array) -> float:
 
 def examine_campaign(
     campaign: Campaign, model: SensorModel, approach: Approach | None = None
-) -> ExaminedFit:
+) -> SessionFit:
     """Return what a campaign can show beside a model, with its own noise.
 
     Parameters
@@ -178,12 +180,12 @@ def examine_campaign(
     approach : Approach; by default robot-aided if the campaign has the robot's angles
     """
     fit = fit_campaign(campaign, model, approach)
-    return examine(solve(fit.model, fit.approach, fit.observed, fit.adjustment))
+    return SessionFit.of(solve(fit.model, fit.approach, fit.observed, fit.adjustment))
 
 
 def examine_scheme(
     scheme: Scheme, model: SensorModel, approach: Approach, noise: Noise | None = None
-) -> ExaminedFit:
+) -> SessionFit:
     """Return what a scheme can show beside a model; nothing is known of times and temperatures.
 
     Raises
@@ -194,13 +196,13 @@ def examine_scheme(
     check_needs_no_plan(model)
     ideal = session(model, np.zeros(model.n_parameters), scheme.directions)
     observed = ideal.observations(noise or Noise())
-    return examine(solve(model, approach, observed))
+    return SessionFit.of(solve(model, approach, observed))
 
 
-def visibility_table(examined: ExaminedFit) -> pd.DataFrame:
+def visibility_table(frame: SessionFit) -> pd.DataFrame:
     """Table for people: one row per effect that is not in the model, in the units shown."""
     rows = []
-    for row in visibilities(examined):
+    for row in visibilities(frame):
 
         def shown(size: float, unit: str = row.unit, seen: bool = row.status == "visible") -> str:
             return amount(size, unit) if seen else "–"

@@ -16,7 +16,6 @@ from accelstudy.adjustment.quality import Solution
 from accelstudy.approaches import Approach
 from accelstudy.basics.wording import words
 from accelstudy.campaign.session import Campaign
-from accelstudy.diagnosis.decision.posterior import Case
 from accelstudy.diagnosis.decision.problem import BaseFit, Problem, fit_base, pose
 from accelstudy.diagnosis.evidence.candidates import UNKNOWN
 from accelstudy.diagnosis.evidence.detection import Chance
@@ -125,17 +124,15 @@ class Sensor:
 
 def _weighed(sensor: Sensor) -> SensorEvidence:
     noise = sensor.noise
-    problem = pose(sensor.fit())
-    chance = Chance(np.random.SeedSequence(sensor.seed), len(problem.base.solution.design), DRAWS)
-    case = Case(problem, sensor.measured, chance)
-    detection, singles = case.detection, case.singles
+    problem = pose(sensor.fit(), np.random.SeedSequence(sensor.seed))
+    detection, singles, chance = problem.detection, problem.singles, problem.chance
     residuals, evidence, unknown = problem.residuals, problem.evidence, problem.unknown
     z, square = residuals.z, float(residuals.z @ residuals.z)
     # A sensor with a noise of its own is no usual one.
     usual = detection.noise if noise is None else detection.noise[:1]
     nothing = float(np.logaddexp.reduce(usual))
     logs = dict(singles.densities)
-    logs |= {one.names[0]: one.log_weight for one in case.noises}
+    logs |= {one.names[0]: one.log_weight for one in problem.noises}
     if noise is not None and noise.said:
         doubted = Level((1.0,), (RULES.freedom_doubted,), known=True)
         logs[LEVEL_OF_NOISE] = float(
@@ -143,8 +140,8 @@ def _weighed(sensor: Sensor) -> SensorEvidence:
         )
     if unknown is not None:
         logs |= {
-            f"{UNKNOWN}({coordinate} → {target})": log
-            for (coordinate, target), log in unknown.place_densities_of(evidence, z).items()
+            f"{UNKNOWN}({coordinate} → {target})": float(log)
+            for (coordinate, target), log in unknown.place_densities(evidence, z).items()
         }
     pairs = {}
     for pair in weigh_sets(singles.shapes, residuals, evidence, most=2):
@@ -159,14 +156,14 @@ def _weighed(sensor: Sensor) -> SensorEvidence:
         p_value=detection.p_value,
         odds={name: log - nothing for name, log in logs.items()},
         pairs=pairs,
-        classes=tuple(one.members for one in case.classes),
+        classes=tuple(one.members for one in problem.classes),
         specs={
             name: best.effect.spec for name, best in singles.best.items() if best.effect is not None
         },
         shapes={
             name: tuple(effect.spec for effect in effects)
-            for name, shapes in problem.examined.candidates.items()
-            if (effects := [h.effect for h in shapes if h.effect is not None])
+            for name, shapes in problem.frame.candidates.items()
+            if (effects := [h.effect for h in shapes.hypotheses if h.effect is not None])
             and not effects[0].sudden
         },
         tested=dict(zip(problem.field.names, odds.T, strict=True)),
@@ -192,7 +189,7 @@ def _by_chance(problem: Problem, chance: Chance, noise: NoisePrior | None) -> Ar
 
     if not field.names:
         return np.zeros((DRAWS, 0))
-    return chance.statistic(problem.residuals, odds)
+    return odds(chance.errors(problem.residuals))
 
 
 def mean_sensor(sensors: Sequence[Sensor], said: Sequence[SensorEvidence]) -> Sensor | None:

@@ -17,7 +17,7 @@ from scipy import stats
 from accelstudy.adjustment.quality import solve
 from accelstudy.campaign.calibration.fit import fit_campaign, usual_approach
 from accelstudy.campaign.session import Campaign
-from accelstudy.diagnosis.space.examined import examine
+from accelstudy.diagnosis.space.frame import SessionFit
 from accelstudy.diagnosis.space.hypotheses import OUTLIER, Hypothesis
 from accelstudy.sensors.sensor import SensorModel
 
@@ -48,11 +48,12 @@ class Problem:
         for _ in range(0 if self.sigma_known else 2):
             weighted = replace(campaign, sigma_force=fit.sigma_position_posteriori)
             fit = fit_campaign(weighted, model, approach)
-        examined = examine(solve(fit.model, fit.approach, fit.observed, fit.adjustment))
-        self.z = examined.frame.residuals.z
-        self.redundancy = examined.frame.residuals.redundancy
-        candidates = examined.candidates.items()
-        self.shapes = [h for name, shapes in candidates if name != OUTLIER for h in shapes]
+        frame = SessionFit.of(solve(fit.model, fit.approach, fit.observed, fit.adjustment))
+        self.z, self.redundancy = frame.residuals.z, frame.residuals.redundancy
+        candidates = frame.candidates.items()
+        self.shapes = [
+            h for name, shapes in candidates if name != OUTLIER for h in shapes.hypotheses
+        ]
         self.dims = np.array([h.dim for h in self.shapes])
         self.parts = np.array([np.sum((self.z @ h.basis) ** 2) for h in self.shapes])
 

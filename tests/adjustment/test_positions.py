@@ -1,8 +1,7 @@
-"""What a calibration or a diagnosis costs grows like its positions, not like their square."""
+"""What a calibration costs grows like its positions; a diagnosis is as whole matrices say."""
 
 import tracemalloc
 from dataclasses import replace
-from functools import partial
 
 import numpy as np
 import pytest
@@ -22,19 +21,15 @@ from accelstudy.adjustment.quality import (
     suspects,
 )
 from accelstudy.approaches import get_approach
+from accelstudy.basics.errors import InputError
 from accelstudy.campaign.calibration.fit import fit_campaign
 from accelstudy.campaign.calibration.result import Calibration
-from accelstudy.diagnosis import pipeline
-from accelstudy.diagnosis.evidence import detection
-from accelstudy.diagnosis.evidence.noise_models import (
-    LENGTHS,
-    quadratic_forms,
-    restricted_likelihood,
-)
+from accelstudy.diagnosis.evidence.noise_models import LENGTHS, STRENGTHS, colour_densities
 from accelstudy.diagnosis.evidence.noise_tests import axis_factors
+from accelstudy.diagnosis.evidence.size import Evidence, Level, log_mean
 from accelstudy.diagnosis.pipeline import diagnose
-from accelstudy.diagnosis.space.examined import examine
-from accelstudy.diagnosis.space.hypotheses import clusters, lack_of_fit
+from accelstudy.diagnosis.space.frame import SessionFit
+from accelstudy.diagnosis.space.hypotheses import clusters, repeats_of
 from accelstudy.effects import HoldConditions, get_effect
 from accelstudy.simulation.sessions import Noise
 
@@ -153,36 +148,36 @@ def complement(columns):
 
 
 @pytest.fixture(scope="module", params=["gravity", "robot"])
-def examined(request):
+def frame(request):
     """A campaign with a repeated scheme, all columns and observed gravity."""
     campaign = acs.simulate_campaign(
         seed=4, scheme="fibonacci-15", repeats=2, approach=request.param,
         temperature=(10.0, 40.0), temperature_order="random",
     )  # fmt: skip
     fit = fit_campaign(replace(campaign, sigma_gravity=1e-3), NINE, get_approach(request.param))
-    return examine(solve(NINE, fit.approach, fit.observed, fit.adjustment))
+    return SessionFit.of(solve(NINE, fit.approach, fit.observed, fit.adjustment))
 
 
-def test_residuals_are_those_of_a_basis_of_the_residual_space(examined):
-    residuals = examined.frame.residuals
+def test_residuals_are_those_of_a_basis_of_the_residual_space(frame):
+    residuals = frame.residuals
     n = complement(residuals.design)
     np.testing.assert_allclose(residuals.z, n @ n.T @ residuals.errors, atol=1e-9)
     assert residuals.redundancy == n.shape[1]
     rows = np.random.default_rng(1).standard_normal((len(n), 4))
     np.testing.assert_allclose(residuals.project(rows), n @ n.T @ rows, atol=1e-12)
     errors = residuals.project(rows)
-    for shapes in examined.candidates.values():
+    for shapes in frame.candidates.values():
         for h, part in zip(shapes, shapes.parts(errors.T).T, strict=True):
             np.testing.assert_allclose(h.basis.T @ h.basis, np.eye(h.dim), atol=1e-9)
             np.testing.assert_allclose(residuals.absorbed.T @ h.basis, 0, atol=1e-9)
             np.testing.assert_allclose(part, np.sum((h.basis.T @ errors) ** 2, axis=0), rtol=1e-7)
 
 
-def test_repeats_and_lack_of_fit_share_the_residual_space(examined):
+def test_repeats_and_lack_of_fit_share_the_residual_space(frame):
     """Against a basis of all differences between conditions of one attitude."""
-    residuals = examined.frame.residuals
+    residuals = frame.residuals
     n, c = residuals.whitening.shape[:2]
-    labels = clusters(examined.frame.forces)
+    labels = clusters(frame.forces)
     assert len(np.unique(labels)) == n / 2
     differences = []
     for i in range(n):
@@ -191,7 +186,7 @@ def test_repeats_and_lack_of_fit_share_the_residual_space(examined):
             change[i, axis], change[labels[i], axis] = 1, -1
             differences.append(residuals.stack(np.linalg.solve(residuals.whitening, change)))
     basis = np.linalg.qr(residuals.project(np.concatenate(differences, axis=1)))[0]
-    same = lack_of_fit(residuals, examined.frame.forces)
+    same = repeats_of(residuals, frame.forces)
     errors = residuals.project(np.random.default_rng(1).standard_normal((len(residuals.z), 5))).T
     repeated = np.sum((errors @ basis) ** 2, axis=1)
     assert same.dims[0] == residuals.redundancy - basis.shape[1]
@@ -199,28 +194,28 @@ def test_repeats_and_lack_of_fit_share_the_residual_space(examined):
     np.testing.assert_allclose(same.parts(errors)[:, 0], rest, rtol=1e-9)
 
 
-def test_coloured_noise_has_the_likelihood_of_whole_covariance_matrices(examined):
-    residuals = examined.frame.residuals
+def test_coloured_noise_has_the_likelihood_of_whole_covariance_matrices(frame):
+    residuals = frame.residuals
     n, c = residuals.whitening.shape[:2]
     basis, i = complement(residuals.design), np.arange(n)
     z, r = basis.T @ residuals.z, residuals.redundancy
     g = np.einsum("ncr,nca->anr", basis[: n * c].reshape(n, c, -1), residuals.force_noise)
-    v = np.random.default_rng(2).standard_normal((4, n, 3))
-    forms = quadratic_forms(v)
-    determinants, squares = restricted_likelihood(residuals, (0.25, 16.0))
-    for k, length in enumerate(LENGTHS):
+    evidence = Evidence(Level.of_stated_sigma(), r)
+    found = colour_densities(residuals, evidence)
+    for length, log in zip(LENGTHS, found, strict=True):
         lag = np.abs(i[:, None] - i)
         kernel = np.exp(-lag / length) if length < np.inf else (np.minimum(i[:, None], i) + 1) / n
-        np.testing.assert_allclose(forms[:, k], np.einsum("bia,ij,bja->b", v, kernel, v))
-        for j, strength in enumerate((0.25, 16.0)):
+        logs = []
+        for strength in STRENGTHS:
             covariance = np.eye(r) + strength * np.einsum("anr,nm,ams->rs", g, kernel, g)
             square = z @ np.linalg.solve(covariance, z)
-            assert squares[k, j] == pytest.approx(square, rel=1e-9)
-            assert determinants[k, j] == pytest.approx(np.linalg.slogdet(covariance)[1], rel=1e-9)
+            determinant = np.linalg.slogdet(covariance)[1]
+            logs.append(np.logaddexp.reduce(evidence.noise_density(square, determinant)))
+        assert log == pytest.approx(log_mean(np.array(logs)), rel=1e-9)
 
 
-def test_factors_of_the_axes_are_those_of_whole_matrices(examined):
-    residuals = examined.frame.residuals
+def test_factors_of_the_axes_are_those_of_whole_matrices(frame):
+    residuals = frame.residuals
     n, c = residuals.whitening.shape[:2]
     basis = complement(residuals.design)
     g = np.einsum("ncr,nca->arn", basis[: n * c].reshape(n, c, -1), residuals.force_noise)
@@ -245,14 +240,7 @@ def test_times_of_a_jump_among_many_holds_are_some_with_all_others_between():
     assert times[20] < min(between) <= max(between) < times[21]
 
 
-def test_memory_of_a_diagnosis_is_linear_in_the_positions(monkeypatch):
-    # What is drawn at once has a size of its own, whatever the positions.
-    monkeypatch.setattr(detection, "AT_ONCE", 10_000)
-    monkeypatch.setattr(pipeline, "Chance", partial(detection.Chance, simulations=20))
-
-    def run(n):
-        campaign = acs.simulate_campaign(seed=4, scheme=f"fibonacci-{n}", approach="robot")
-        return diagnose(campaign, NINE)
-
-    few, many = FEW // 2, MANY // 2
-    assert peak(lambda: run(many)) < 1.3 * many / few * peak(lambda: run(few))
+def test_a_diagnosis_of_too_many_positions_ends_in_one_line():
+    campaign = acs.simulate_campaign(seed=4, scheme="fibonacci-1001")
+    with pytest.raises(InputError, match="at most 1000 positions, and there are 1001"):
+        diagnose(campaign, NINE)

@@ -15,7 +15,6 @@ from accelstudy.campaign.format import read_campaign, write_campaign
 from accelstudy.campaign.reference import ReferenceSensor
 from accelstudy.campaign.session import Campaign
 from accelstudy.diagnosis.next_positions import candidate_rows
-from accelstudy.diagnosis.space.examined import ExaminedFit
 from accelstudy.diagnosis.space.frame import SessionFit
 from accelstudy.leveling.angles import angles_of
 from accelstudy.positions.points import evenly_spread
@@ -139,11 +138,11 @@ def test_the_diagnosis_asks_for_positions_with_the_same_covariance(campaign):
 
 def test_a_reference_has_no_errors_of_a_robot(campaign):
     solution = solve(TWELVE, ROBOT, campaign_observations(campaign))
-    examined = ExaminedFit.of(SessionFit.of(solution))
+    tested = SessionFit.of(solution).tested
     of_robot = {"encoder_scale", "encoder_offset", "base_tilt", "axis_nonperpendicularity"}
-    assert of_robot < {*examined.untestable}
-    assert {"quadratic_scale", "bias_drift"} & {*examined.candidates}
-    assert not of_robot & {*examined.candidates}
+    assert of_robot < {*tested.untestable}
+    assert {"quadratic_scale", "bias_drift"} & {*tested.shapes}
+    assert not of_robot & {*tested.shapes}
 
 
 def test_simulated_sessions_confirm_the_sigmas(campaign):

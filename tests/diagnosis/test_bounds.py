@@ -36,7 +36,7 @@ def saturated(k, knee, seed):
 
 def weighed(campaign):
     problem = pose(fit_base(campaign, get_model("bias-scale"), get_approach("gravity")))
-    return problem, weigh_singles(problem.examined, problem.evidence)
+    return problem, weigh_singles(problem.frame, problem.evidence)
 
 
 @pytest.mark.parametrize("d", [1, 2, 3])
@@ -79,7 +79,7 @@ def test_the_uncertainty_of_a_knee_is_in_all_sigmas():
     campaign = saturated(np.array([0.1, 0.06, 0.12]), 8.8, 2)
     problem, singles = weighed(campaign)
     cause = Cause("saturation", ("saturation",), singles.best["saturation"])
-    (found,), fit = best_refit(problem.examined, singles, [cause])
+    (found,), fit = best_refit(problem.frame, singles, [cause])
     chosen = found.shape
     assert fit.model.parameter_names[6:] == ("k_sat_x", "k_sat_y", "k_sat_z")
 
@@ -95,11 +95,11 @@ def test_the_uncertainty_of_a_knee_is_in_all_sigmas():
     slope = np.stack([(norm(p + h, read) - norm(p - h, read)) / 2e-6 for h in 1e-6 * np.eye(10)])
     by_read = np.stack([(norm(p, read + h) - norm(p, read - h)) / 2e-6 for h in 1e-6 * np.eye(3)])
     white = slope / (SIGMA * np.linalg.norm(by_read, axis=0))
-    tried = [h.value for h in problem.examined.candidates["saturation"]]
+    tried = [h.value for h in problem.frame.candidates["saturation"].hypotheses]
     normal = white @ white.T
     normal[9, 9] += 12 / np.log(max(tried) / min(tried)) ** 2
     expected = np.sqrt(np.diag(np.linalg.inv(normal)))
-    found = np.sqrt(np.diag(with_settings(problem.examined, fit, [chosen])))
+    found = np.sqrt(np.diag(with_settings(problem.frame, fit, [chosen])))
     np.testing.assert_allclose(found, expected, rtol=0.02)
     np.testing.assert_allclose(np.sqrt(np.diag(fit.cofactors)), found[:9], rtol=1e-12)
     without = np.sqrt(np.diag(np.linalg.inv(white[:9] @ white[:9].T)))

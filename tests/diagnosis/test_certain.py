@@ -11,15 +11,14 @@ import accelstudy as acs
 from accelstudy.adjustment.quality import solve
 from accelstudy.basics.errors import InputError
 from accelstudy.campaign.gross_errors.recognition import recognise
-from accelstudy.diagnosis.decision.posterior import Case, Posterior
+from accelstudy.diagnosis.decision.posterior import Posterior
 from accelstudy.diagnosis.decision.problem import fit_base, pose
 from accelstudy.diagnosis.decision.refits import refit
 from accelstudy.diagnosis.decision.verdict import Finding, Reason, withdraw_refuted
-from accelstudy.diagnosis.evidence.detection import Chance
 from accelstudy.diagnosis.pipeline import diagnose
 from accelstudy.diagnosis.prediction import held_out_gap
 from accelstudy.diagnosis.report.words import verdict_lines
-from accelstudy.diagnosis.space.examined import examine
+from accelstudy.diagnosis.space.frame import SessionFit
 from accelstudy.effects import get_effect
 from accelstudy.leveling.angles import specific_force
 
@@ -74,7 +73,7 @@ def predicted(campaign):
     n = len(campaign.forces)
     held = np.arange(0, n, 3)
     base = solve(first.model, GRAVITY, first.observed.take(np.setdiff1d(np.arange(n), held)))
-    extended = refit(base, [examine(base).hypothesis(get_effect("quadratic_scale"))])
+    extended = refit(base, SessionFit.of(base).hypotheses([get_effect("quadratic_scale")]))
     return held_out_gap(base, extended, first.observed.take(held), held, 1.0)
 
 
@@ -94,13 +93,12 @@ def test_the_held_out_positions_refute_an_effect_that_is_not_there():
     gap = predicted(replace(campaign, forces=forces + effect))
     assert gap.refutes
     problem = pose(fit_base(campaign, NINE, GRAVITY))
-    best = problem.examined.candidates["quadratic_scale"][0]
+    best = problem.frame.candidates["quadratic_scale"][0]
     weighed = explanation("quadratic_scale", 0.0, best=[best])
     finding = Finding(
         "named", problem.frame, chosen=weighed.causes, posterior=Posterior.of([weighed])
     )
-    case = Case(problem, campaign, Chance(np.random.SeedSequence(1), len(problem.residuals.z)))
-    said = withdraw_refuted(case, finding, gap)
+    said = withdraw_refuted(problem, finding, gap)
     assert said.verdict == "unknown"
     assert said.reason == Reason.of(
         "refuted", names=["quadratic_scale"], before=gap.before, after=gap.after

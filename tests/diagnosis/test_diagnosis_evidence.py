@@ -9,8 +9,8 @@ from scipy import stats
 from usual import GRAVITY, NINE, ROBOT, G
 
 from accelstudy.diagnosis.decision.noise import misfit
-from accelstudy.diagnosis.decision.posterior import Explanation, Posterior, credible_set
-from accelstudy.diagnosis.evidence.candidates import Cause
+from accelstudy.diagnosis.decision.posterior import Explanation, Posterior
+from accelstudy.diagnosis.evidence.candidates import Cause, Field
 from accelstudy.diagnosis.evidence.detection import draw_effects, log_ratio
 from accelstudy.diagnosis.evidence.noise_models import UnequalAxes
 from accelstudy.diagnosis.evidence.noise_tests import NOISES, most_evidence
@@ -81,18 +81,18 @@ def test_densities_are_those_of_gaussian_processes(known):
 
 
 @pytest.fixture(scope="module", params=[ROBOT, GRAVITY], ids=lambda approach: approach.name)
-def examined(request):
+def frame(request):
     return design(shuffled("fibonacci-30"), request.param, seed=7)
 
 
-def test_noise_is_not_noise_with_an_effect(examined):
+def test_noise_is_not_noise_with_an_effect(frame):
     """What is drawn with an effect is found, and its weight takes it out again."""
-    residuals, rng = examined.frame.residuals, np.random.default_rng(3)
-    candidates = [*examined.candidates.values()]
-    changed = draw_effects(candidates, len(residuals.design), 400, rng)
+    residuals, rng = frame.residuals, np.random.default_rng(3)
+    shapes = Field(frame.candidates).spaces
+    changed = draw_effects(shapes, 400, rng)
     noise = rng.standard_normal(changed.shape) + residuals.project(changed.T).T
     z = residuals.project(noise.T).T
-    weights = np.exp(-log_ratio(candidates, [shapes.parts(z) for shapes in candidates]))
+    weights = np.exp(-log_ratio(shapes, shapes.parts(z)))
     squares = np.sum(z**2, axis=1)
     r = residuals.redundancy
     assert np.mean(squares) > r + 10
@@ -109,7 +109,7 @@ def test_axes_are_weighted_as_far_as_the_data_say(approach):
         for seed in range(8):
             noise = Noise(sigma_angle=1e-6, effects=effects)
             residuals = design(shuffled("fibonacci-60"), approach, noise=noise, seed=seed)
-            residuals = residuals.frame.residuals
+            residuals = residuals.residuals
             evidence = Evidence(Level.of_nothing_stated(), residuals.redundancy)
             axes = UnequalAxes.of(residuals, evidence, None)
             odds[effect].append(axes.log_evidence)
@@ -122,7 +122,7 @@ def test_axes_are_weighted_as_far_as_the_data_say(approach):
 
 def test_what_the_holds_show_of_the_axes_counts_where_residuals_say_little():
     """With equal residuals the ratios within the holds are believed by half or so."""
-    residuals = design(shuffled("mclaren-24"), GRAVITY, seed=3).frame.residuals
+    residuals = design(shuffled("mclaren-24"), GRAVITY, seed=3).residuals
     evidence = Evidence(Level.of_nothing_stated(), residuals.redundancy)
     alone = UnequalAxes.of(residuals, evidence, None).ratios
     shown = UnequalAxes.of(residuals, evidence, np.array([1.0, 1.0, 4.0])).ratios
@@ -183,8 +183,8 @@ def test_wrong_noise_of_all_kinds_is_one_explanation():
 
 def test_a_credible_set_is_the_smallest():
     p = [0.05, 0.5, 0.1, 0.35]
-    found = credible_set(explanation(str(x), posterior=x) for x in p)
-    assert [one.posterior for one in found] == [0.5, 0.35, 0.1]
+    found = Posterior.of([explanation(str(x), np.log(x)) for x in p]).credible_set
+    assert [one.posterior for one in found] == pytest.approx([0.5, 0.35, 0.1])
 
 
 @pytest.mark.parametrize(("level", "spread", "of_repeats"), [

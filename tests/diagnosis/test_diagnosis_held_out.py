@@ -8,7 +8,6 @@ from usual import GRAVITY, NINE, ROBOT, G
 import accelstudy as acs
 from accelstudy.basics.wording import words
 from accelstudy.diagnosis import held_out
-from accelstudy.diagnosis.decision.posterior import Alternatives
 from accelstudy.diagnosis.decision.refits import refit
 from accelstudy.diagnosis.evidence.candidates import weigh_singles
 from accelstudy.diagnosis.evidence.detection import Chance, detect
@@ -40,7 +39,7 @@ def parts(request):
 
 def weighed(problem):
     """The evidence for each candidate by itself."""
-    return weigh_singles(problem.examined, problem.evidence)
+    return weigh_singles(problem.frame, problem.evidence)
 
 
 def test_a_name_that_noise_made_is_confirmed_in_5_percent(parts):
@@ -49,15 +48,15 @@ def test_a_name_that_noise_made_is_confirmed_in_5_percent(parts):
     residuals, field, evidence = problem.residuals, problem.field, problem.evidence
     chance = Chance(np.random.SeedSequence(1), len(residuals.design))
     beyond = detect(field, evidence, residuals, chance).threshold(RULES.level_effects)
-    weighing, rng = Alternatives(problem), np.random.default_rng(3)
-    needed = held_out.threshold(weighing, None, beyond, part, split, rng)
+    rng = np.random.default_rng(3)
+    needed = held_out.threshold(problem, None, beyond, part, split, rng)
     assert needed > RULES.z_significant + 0.3
     rng = np.random.default_rng(4)
     noise = rng.standard_normal((SETS, len(residuals.design)))
     z = residuals.project(noise.T).T
     odds = field.odds(evidence, field.project(z))
     of_any = np.logaddexp.reduce(odds, axis=1) - np.log(len(field.names))
-    label = held_out.labels(weighing.classes)
+    label = held_out.labels(problem.classes)
     claimed = held_out.claimed_names(odds, field.names, label)
     sets = np.flatnonzero((claimed >= 0) & (of_any > beyond))
     found, change = held_out.chosen_names(part, split, noise[sets], label)

@@ -33,7 +33,7 @@ from accelstudy.diagnosis.pipeline import diagnose
 from accelstudy.diagnosis.report.output import Diagnosis
 from accelstudy.diagnosis.report.words import render, verdict_lines, warnings
 from accelstudy.diagnosis.rules import RULES
-from accelstudy.diagnosis.space.examined import examine
+from accelstudy.diagnosis.space.frame import SessionFit
 from accelstudy.leveling.error import cap_forces, holds_in_use
 from accelstudy.simulation.sessions import Noise, session
 from accelstudy.study.config import read_study
@@ -151,8 +151,7 @@ def told(diagnosis, folder):
 
 @pytest.mark.usefixtures("composed")
 def test_a_narrowed_diagnosis_is_told_as_a_set(named, tmp_path):
-    examined = examine(named.frame.solution)
-    shapes = examined.candidates
+    shapes = SessionFit.of(named.frame.solution).candidates
     thermal, drift = (shapes[name][0] for name in ("thermal_bias", "thermal_curve"))
     weighed = [
         explanation(name, np.log(p), best=best)
@@ -164,8 +163,8 @@ def test_a_narrowed_diagnosis_is_told_as_a_set(named, tmp_path):
     ]
     posterior = Posterior.of(weighed)
     finding = Finding(
-        "narrowed", named.final, None, named.finding.chosen, posterior,
-        statement_of(posterior.credible_set, named.case.cosine),
+        "narrowed", named.final, Reason(), named.finding.chosen, posterior,
+        statement_of(posterior.credible_set, named.problem.cosine),
     )  # fmt: skip
     diagnosis = replace(otherwise(named, finding), gap=replace(named.gap, names=()))
     content, text = told(diagnosis, tmp_path)
@@ -191,7 +190,7 @@ def test_what_is_certain_of_the_unknown_is_told_and_in_the_model(named, tmp_path
     posterior = Posterior.of(weighed)
     finding = Finding(
         "unknown", named.final, Reason.of("not in the catalogue"), named.finding.chosen, posterior,
-        statement_of(posterior.all, named.case.cosine),
+        statement_of(posterior.all, named.problem.cosine),
     )  # fmt: skip
     diagnosis = otherwise(named, finding, next_positions=())
     content, text = told(diagnosis, tmp_path)

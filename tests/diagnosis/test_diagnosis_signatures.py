@@ -1,15 +1,14 @@
 """Signatures of effects: derivatives of the observations, and what a design shows of them."""
 
 from dataclasses import replace
-from types import SimpleNamespace
 
 import numpy as np
 import pytest
 from diagnosis_helpers import campaign, design, shuffled, some_holds
 from usual import GRAVITY, NINE, G
 
-from accelstudy.diagnosis.space.frame import HoldColumns, signatures
-from accelstudy.diagnosis.space.hypotheses import OUTLIER
+from accelstudy.diagnosis.space.frame import Candidates, HoldColumns, signatures
+from accelstudy.diagnosis.space.hypotheses import OUTLIER, Hypotheses
 from accelstudy.diagnosis.visibility import (
     examine_campaign,
     upper_limits,
@@ -71,13 +70,13 @@ def test_an_effect_is_judged_in_the_settings_that_a_diagnosis_tries():
     directions = shuffled("fibonacci-30")
     directions[-3:] = [[0, 0, 1], [0, 0.01, 1], [0.01, 0, 1]]
     directions /= np.linalg.norm(directions, axis=1)[:, None]
-    examined = design(directions, GRAVITY, some_holds(30), seed=1)
-    rows = {row.name: row for row in visibilities(examined)}
+    frame = design(directions, GRAVITY, some_holds(30), seed=1)
+    rows = {row.name: row for row in visibilities(frame)}
     jump = rows["bias_jump"]
-    tried = [h.effect.spec for h in examined.candidates["bias_jump"]]
+    tried = [h.effect.spec for h in frame.candidates["bias_jump"]]
     assert jump.easiest.spec in tried
     assert 600 < jump.easiest.settings["t"] < 1200
-    limits = {limit.name: limit.value for limit in upper_limits(examined, True, ())}
+    limits = {limit.name: limit.value for limit in upper_limits(frame, True, ())}
     for name in ("bias_jump", "warm_up", "saturation"):
         assert rows[name].mdb < 3 * limits[name], name
     assert rows["bias_drift"].easiest.settings == {}
@@ -89,19 +88,20 @@ def test_the_limit_of_a_parameter_holds_where_no_noise_is_stated():
     That is when noise takes it down by more than half of its interval of 95 %.
     """
     rng = np.random.default_rng(5)
-    examined = design(shuffled("fibonacci-14"), GRAVITY, some_holds(14), seed=1)
-    residuals = examined.frame.residuals
+    frame = design(shuffled("fibonacci-14"), GRAVITY, some_holds(14), seed=1)
+    residuals = frame.residuals
     assert residuals.redundancy == 5
-    names = [n for n, shapes in examined.candidates.items() if {h.dim for h in shapes} == {1}]
-    shape = examined.candidates[next(n for n in names if n != OUTLIER)][0]
-    columns = examined.frame.rows(shape.effect)
+    names = [n for n, shapes in frame.candidates.items() if {h.dim for h in shapes} == {1}]
+    shape = frame.candidates[next(n for n in names if n != OUTLIER)][0]
+    columns = frame.rows(shape.effect)
     size = 1000 / float(np.linalg.norm(residuals.project(columns)))
     short = 0
+    shown = Candidates({shape.effect.name: Hypotheses.of([shape])}, (), {})
     for _ in range(n := 1500):
         errors = columns[:, 0] * size + 2 * rng.standard_normal(len(columns))
-        frame = replace(examined.frame, residuals=replace(residuals, errors=errors))
-        fit = SimpleNamespace(frame=frame, candidates={shape.effect.name: (shape,)})
-        (limit,) = upper_limits(fit, False, ())
+        changed = replace(frame, residuals=replace(residuals, errors=errors))
+        vars(changed)["tested"] = shown
+        (limit,) = upper_limits(changed, False, ())
         short += limit.value < size
     assert abs(short / n - 0.025) < 4.5 * np.sqrt(0.025 * 0.975 / n)
 

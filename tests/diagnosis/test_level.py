@@ -11,11 +11,10 @@ from accelstudy.basics.levels import REFUTATION_LEVEL
 from accelstudy.campaign.calibration.assessment import assess
 from accelstudy.campaign.calibration.fit import fit_campaign
 from accelstudy.campaign.calibration.wording import verdict_lines as calibrated_lines
-from accelstudy.diagnosis.decision.problem import BaseFit, Problem
+from accelstudy.diagnosis.decision.problem import SEED, BaseFit, Problem
 from accelstudy.diagnosis.evidence import detection
-from accelstudy.diagnosis.evidence.candidates import Field
-from accelstudy.diagnosis.evidence.detection import Chance, detect, tail_probability, total_odds
-from accelstudy.diagnosis.evidence.size import Level
+from accelstudy.diagnosis.evidence.detection import Chance, detect, tail_probability
+from accelstudy.diagnosis.evidence.size import Level, log_mean
 from accelstudy.diagnosis.held_out import Gap
 from accelstudy.diagnosis.pipeline import decide, diagnose
 from accelstudy.diagnosis.report.words import TEMPLATE, badge, verdict_lines
@@ -43,9 +42,9 @@ def designs():
 ])  # fmt: skip
 def test_noise_alone_counts_as_often_as_the_level_says(designs, approach, level, wanted):
     """Each null simulation has a seed of its own, so that the rates scatter as they really do."""
-    examined, rng = designs[approach], np.random.default_rng([1, 2])
-    residuals = examined.frame.residuals
-    problem = Problem(BaseFit(examined.frame.solution, level, None), examined)
+    frame, rng = designs[approach], np.random.default_rng([1, 2])
+    residuals = frame.residuals
+    problem = Problem(BaseFit(frame.solution, level, None), frame, SEED)
     field, evidence = problem.field, problem.evidence
     rates, seen, weights = [], [], []
     for seed in range(RUNS):
@@ -53,7 +52,7 @@ def test_noise_alone_counts_as_often_as_the_level_says(designs, approach, level,
         errors = rng.standard_normal((SETS, len(residuals.design)))
         found = detect(field, evidence, replace(residuals, errors=errors[0]), chance)
         z = residuals.project(errors.T).T
-        odds = total_odds(field.odds(evidence, field.project(z)))
+        odds = log_mean(field.odds(evidence, field.project(z)))
         p = np.array([tail_probability(found.by_chance, found.weights, value) for value in odds])
         # Densities of many sets at once are rounded: one or two may move past the observed one.
         assert p[0] == pytest.approx(found.p_value, abs=0.005)
@@ -80,15 +79,15 @@ def test_a_diagnosis_decides_at_the_levels(known, level):
     """
     measured = campaign(1, scheme="mclaren-24", sigma_known=known)
     says = calibrated_lines(assess(fit_campaign(measured, NINE, ROBOT)))
-    case = diagnose(measured, NINE).case
+    problem = diagnose(measured, NINE).problem
     for p, verdict, weak in (
         (level + 1e-6, "no_effect", False),
         (level - 1e-6, "no_effect" if known else "unknown", known),
         (REFUTATION_LEVEL + 1e-6, "no_effect" if known else "unknown", known),
         (REFUTATION_LEVEL - 1e-6, "unknown", False),
     ):
-        vars(case)["detection"] = replace(case.detection, p_value=p)
-        found = CampaignDiagnosis(case, decide(case), Gap(1.0))
+        vars(problem)["detection"] = replace(problem.detection, p_value=p)
+        found = CampaignDiagnosis(problem, measured, decide(problem, measured), Gap(1.0))
         assert (found.verdict, found.code == "weak") == (verdict, weak)
         assert badge(found) == ("accepted" if weak else verdict)
         if weak:
@@ -104,10 +103,10 @@ def test_no_random_number_is_drawn_twice(monkeypatch):
     residuals = Residuals(design, np.zeros(n + priors), one, one, np.ones((n, 1)))
     chance = Chance(np.random.SeedSequence(1), n, sets)
     monkeypatch.setattr(
-        detection, "draw_effects", lambda _, m, count, rng: rng.standard_normal((count, m))
+        detection, "draw_effects", lambda m, count, rng: rng.standard_normal((count, m))
     )
-    plain = np.concatenate(list(chance.errors(residuals)))
-    changed = np.concatenate(list(chance.errors_with_effects(residuals, Field({}))))[sets // 2 :]
+    plain = chance.errors(residuals)
+    changed = chance.errors_with_effects(residuals, n + priors)[sets // 2 :]
     left = np.concatenate([plain, changed - plain[sets // 2 :]])[:, 2:].round(9)
     assert left.shape == (sets + sets // 2, n + priors - 2)
     assert len(np.unique(left)) == left.size

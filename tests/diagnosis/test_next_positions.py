@@ -12,7 +12,7 @@ import accelstudy as acs
 from accelstudy.adjustment.quality import solve
 from accelstudy.campaign.calibration.fit import fit_campaign
 from accelstudy.diagnosis.next_positions import CANDIDATE_SCHEME, candidate_rows, next_positions
-from accelstudy.diagnosis.space.examined import examine
+from accelstudy.diagnosis.space.frame import SessionFit
 from accelstudy.leveling.angles import specific_force
 from accelstudy.schemes import get_scheme
 from accelstudy.sensors.models import compose
@@ -32,10 +32,10 @@ def rivals():
     directions = shuffled("mclaren-24")
     ideal = session(model, np.append(np.zeros(9), QUADRATIC), directions, G)
     observed = ideal.draw(Noise(sigma_force=SIGMA), 1, np.random.default_rng(2))
-    examined = examine(solve(NINE, GRAVITY, replace(observed, angles=None)))
-    shapes = [examined.candidates[name][0] for name in ("quadratic_scale", "cubic_scale")]
+    frame = SessionFit.of(solve(NINE, GRAVITY, replace(observed, angles=None)))
+    shapes = [frame.candidates[name][0] for name in ("quadratic_scale", "cubic_scale")]
     seen = (np.linalg.norm(observed.forces[0], axis=1) - G) / SIGMA
-    return examined, shapes, -directions, seen
+    return frame, shapes, -directions, seen
 
 
 def rows(u, name):
@@ -66,8 +66,8 @@ def separations(u, old, taken, candidates):
 
 def test_each_position_adds_most_of_all_candidates(rivals):
     """One after the other, each in an attitude of its own, beside those that were taken before."""
-    examined, (quadratic, cubic), u, old = rivals
-    found = next_positions(examined.frame, (quadratic,), (cubic,))
+    frame, (quadratic, cubic), u, old = rivals
+    found = next_positions(frame, (quadratic,), (cubic,))
     assert len(found) == 3
     candidates = -get_scheme(CANDIDATE_SCHEME).directions
     alone = separations(u, old, np.empty((0, 3)), candidates)
@@ -93,8 +93,8 @@ def test_candidates_show_an_effect_as_an_adjustment_with_it_does(name):
     """In the positions of a session, beside its parameters; a reading has a sign, too."""
     observed = session(NINE, np.zeros(9), shuffled("fibonacci-24"), G).observations(Noise())
     extended = solve(compose("with it", (*(e.spec for e in NINE.effects), name)), ROBOT, observed)
-    frame = (examined := examine(solve(NINE, ROBOT, observed))).frame
-    effect = examined.candidates[name][0]
+    frame = SessionFit.of(solve(NINE, ROBOT, observed))
+    effect = frame.candidates[name][0]
     found = candidate_rows(frame, frame.forces, frame.hold, [effect]).reshape(72, -1)
     expected = np.hstack([extended.design[:, :9], extended.design[:, 9:] @ effect.directions])
     np.testing.assert_allclose(found.T @ found, expected.T @ expected, rtol=1e-6, atol=1e-3)
@@ -105,13 +105,13 @@ def test_effects_of_time_are_told_apart_later():
         scheme="fibonacci-30", interval=60.0, effects=("bias_drift: 1e-5, 1e-5, 1e-5",)
     )
     fit = fit_campaign(campaign, NINE, ROBOT)
-    examined = examine(solve(fit.model, fit.approach, fit.observed))
-    drift, warm = (examined.candidates[name][0] for name in ("bias_drift", "warm_up"))
-    found = next_positions(examined.frame, (drift,), (warm,))
+    frame = SessionFit.of(solve(fit.model, fit.approach, fit.observed))
+    drift, warm = (frame.candidates[name][0] for name in ("bias_drift", "warm_up"))
+    found = next_positions(frame, (drift,), (warm,))
     assert all(position.temperature is None for position in found)
     assert [position.later for position in found] == pytest.approx([30 * 60.0] * 3)
     assert found[0].separates == (("bias_drift",), ("warm_up",))
     # What both explanations have in common separates nothing.
-    quadratic = examined.candidates["quadratic_scale"][0]
-    both = next_positions(examined.frame, (drift, quadratic), (warm, quadratic))
+    quadratic = frame.candidates["quadratic_scale"][0]
+    both = next_positions(frame, (drift, quadratic), (warm, quadratic))
     assert both[0].separates == (("bias_drift",), ("warm_up",))

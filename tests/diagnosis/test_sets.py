@@ -12,7 +12,7 @@ from accelstudy.diagnosis.evidence import sets
 from accelstudy.diagnosis.evidence.sets import set_prior, weigh_sets
 from accelstudy.diagnosis.evidence.size import Evidence, Level
 from accelstudy.diagnosis.rules import RULES
-from accelstudy.diagnosis.space.hypotheses import OUTLIER, EffectShapes
+from accelstudy.diagnosis.space.hypotheses import OUTLIER, Hypotheses
 
 APART = 0.05
 """Share of one space that has to be left beside the other, in squares."""
@@ -27,10 +27,10 @@ CHOSEN = {
 def problem(request):
     directions = shuffled("fibonacci-9" if request.param is ROBOT else "icosahedron-12")
     directions = np.concatenate([directions, directions[:6]])
-    examined = design(directions, request.param, some_holds(len(directions)), seed=3)
+    frame = design(directions, request.param, some_holds(len(directions)), seed=3)
     chosen = CHOSEN[request.param.name]
-    shapes = {name: examined.candidates[name] for name in chosen if name in examined.candidates}
-    residuals = examined.frame.residuals
+    shapes = {name: frame.candidates[name] for name in chosen if name in frame.candidates}
+    residuals = frame.residuals
     return shapes, residuals, Evidence(Level.of_stated_sigma(), residuals.redundancy)
 
 
@@ -71,7 +71,7 @@ def by_names(found):
 def test_sets_of_shapes_have_the_density_of_their_joint_space(problem):
     """One shape of each candidate: exact for every pair, and for every set of three."""
     shapes, residuals, evidence = problem
-    single = {name: EffectShapes.of([own[0]]) for name, own in shapes.items() if name != OUTLIER}
+    single = {name: Hypotheses.of([own[0]]) for name, own in shapes.items() if name != OUTLIER}
     found, expected = by_names(weigh_sets(single, residuals, evidence)), {}
     for size in (2, 3):
         for names in combinations(single, size):

@@ -15,7 +15,7 @@ from accelstudy.effects.smooth import LENGTHS
 @pytest.fixture(scope="module", params=[ROBOT, GRAVITY], ids=lambda approach: approach.name)
 def frame(request):
     directions = shuffled("fibonacci-30")
-    return design(directions, request.param, hold=some_holds(30), seed=7).frame
+    return design(directions, request.param, hold=some_holds(30), seed=7)
 
 
 @pytest.fixture(scope="module")
@@ -111,7 +111,7 @@ def test_beside_an_effect_a_shape_is_what_the_effect_leaves(shapes):
 
 def test_coordinates_are_those_of_the_campaign():
     measured = campaign()
-    frame = examine_campaign(measured, NINE).frame
+    frame = examine_campaign(measured, NINE)
     for name, expected in {
         "time": measured.time,
         "temperature": measured.temperature,

@@ -20,10 +20,8 @@ OTHERS = [name for name in effect_names() if name not in (*SHOWN, *(e.name for e
 def shown():
     """A scheme without a robot, beside a catalogue of three nonlinear effects."""
     with effects_without(OTHERS):
-        examined = examine_scheme(
-            get_scheme("fibonacci-36"), NINE, GRAVITY, Noise(sigma_force=SIGMA)
-        )
-        return examined, visibility_table(examined)
+        frame = examine_scheme(get_scheme("fibonacci-36"), NINE, GRAVITY, Noise(sigma_force=SIGMA))
+        return frame, visibility_table(frame)
 
 
 def left_of(design, columns):
@@ -67,8 +65,8 @@ def test_the_table_says_what_shows_what_does_not_and_why(shown):
     for row in visibilities(shown[0]):
         assert float(table.loc[row.name, "MDB"]) == pytest.approx(1e6 * row.mdb, rel=5e-3)
         assert table.loc[row.name, ["status", "unit"]].tolist() == ["visible", "ppm"]
-    examined = examine_scheme(get_scheme("fibonacci-36"), NINE, GRAVITY)
-    table = visibility_table(examined).set_index("effect")
+    frame = examine_scheme(get_scheme("fibonacci-36"), NINE, GRAVITY)
+    table = visibility_table(frame).set_index("effect")
     for name in ("mounting_rotation", "encoder_offset"):  # which no norm can show
         shown_of = table.loc[name, ["status", "MDB", "MIB", "unit"]].tolist()
         assert shown_of == ["invisible", "–", "–", ""]

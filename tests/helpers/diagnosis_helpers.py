@@ -1,4 +1,4 @@
-"""Simulated campaigns for the tests of the diagnosis, and examined fits of ideal sensors."""
+"""Simulated campaigns for the tests of the diagnosis, and fits of ideal sensors."""
 
 from dataclasses import replace
 
@@ -15,7 +15,7 @@ from accelstudy.diagnosis.decision.posterior import Explanation
 from accelstudy.diagnosis.decision.problem import BaseFit, pose
 from accelstudy.diagnosis.evidence.candidates import Cause
 from accelstudy.diagnosis.evidence.size import Level
-from accelstudy.diagnosis.space.examined import examine
+from accelstudy.diagnosis.space.frame import SessionFit
 from accelstudy.effects import HoldConditions
 from accelstudy.schemes import get_scheme
 from accelstudy.simulation.sessions import Noise, session
@@ -55,14 +55,14 @@ def shuffled(scheme, seed=4):
 
 
 def design(directions, approach=ROBOT, hold=None, model=NINE, noise=None, seed=None):
-    """The examined fit of a session of an ideal sensor: without noise, or with noise of a seed."""
+    """The fit of a session of an ideal sensor: without noise, or with noise of a seed."""
     noise = noise or Noise()
     ideal = session(model, np.zeros(model.n_parameters), directions, G, hold)
     if seed is None:
         observed = ideal.observations(noise)
     else:
         observed = ideal.draw(noise, 1, np.random.default_rng(seed))
-    return examine(solve(model, approach, observed))
+    return SessionFit.of(solve(model, approach, observed))
 
 
 def posed(approach, observed, level=None):

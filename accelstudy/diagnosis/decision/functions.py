@@ -17,7 +17,7 @@ from scipy import special
 
 from accelstudy.adjustment.quality import Solution
 from accelstudy.diagnosis.decision.noise import misfit
-from accelstudy.diagnosis.decision.posterior import Case, Posterior
+from accelstudy.diagnosis.decision.posterior import Posterior
 from accelstudy.diagnosis.decision.problem import Problem
 from accelstudy.diagnosis.decision.refits import refit
 from accelstudy.diagnosis.decision.verdict import Finding, impossible
@@ -42,7 +42,7 @@ LAGS = (0.1, 1.0)
 """Lags by which a rate of temperature is taken, as parts of the time between two holds."""
 
 
-def learn_function(case: Case, posterior: Posterior, finding: Finding) -> Finding | None:
+def learn_function(problem: Problem, posterior: Posterior, finding: Finding) -> Finding | None:
     """Learn a function where nothing has a name, and one coordinate and target have it; else None.
 
     Beside it is what is certain or, where that leaves a misfit, all of the explanation that has it,
@@ -50,16 +50,15 @@ def learn_function(case: Case, posterior: Posterior, finding: Finding) -> Findin
 
     Parameters
     ----------
-    case : Case
+    problem : Problem
     posterior : Posterior, before any effect of it was doubted
     finding : Finding, that it is unknown
     """
-    problem = case.problem
     found = most_probable_place(problem, posterior)
     if found is None or found.probability < RULES.sure:
         return None
     certain = [cause for cause in finding.chosen if cause.name not in found.names]
-    doubted = [_cause(case, posterior, name) for name in found.names]
+    doubted = [_cause(problem, posterior, name) for name in found.names]
     # What is doubted may be the mean of what the function changes, or a part of the function.
     for beside in (finding.chosen, (*certain, *doubted)):
         fitted = fit_of_place(problem, found.place, [cause.shape for cause in beside])
@@ -101,11 +100,11 @@ def most_probable_place(problem: Problem, posterior: Posterior) -> PlaceFound | 
     return PlaceFound(place, totals[place], beside[place][1])
 
 
-def _cause(case: Case, posterior: Posterior, name: str) -> Cause:
+def _cause(problem: Problem, posterior: Posterior, name: str) -> Cause:
     """Effect that an explanation has beside a function, with its probability."""
     having = [one.posterior for one in posterior.all if name in one.names]
-    best = case.problem.examined.candidates[name].strongest(case.problem.residuals.z)
-    return Cause(name, case.members[name], best, min(sum(having), 1.0))
+    best = problem.frame.candidates[name].strongest(problem.residuals.z)
+    return Cause(name, problem.members[name], best, min(sum(having), 1.0))
 
 
 def shares_of_places(problem: Problem, names: Sequence[str]) -> dict[Place, float]:
@@ -114,12 +113,12 @@ def shares_of_places(problem: Problem, names: Sequence[str]) -> dict[Place, floa
     if unknown is None:
         return {}
     for name in names[: names.index(UNKNOWN)]:
-        beside = problem.examined.candidates[name].strongest(left.z).basis
+        beside = problem.frame.candidates[name].strongest(left.z).basis
         left, unknown = left.orthogonal_to(beside), unknown.orthogonal_to(beside)
     if not unknown.places:
         return {}
     evidence = replace(problem.evidence, redundancy=left.redundancy)
-    places = unknown.place_densities_of(evidence, left.z)
+    places = unknown.place_densities(evidence, left.z)
     shares = special.softmax([*places.values()]).tolist()
     return dict(zip(places, shares, strict=True))
 

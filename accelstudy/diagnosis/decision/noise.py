@@ -6,12 +6,13 @@ from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 from scipy import special
 
 from accelstudy.adjustment.quality import Solution, pooled_variance
 from accelstudy.basics.levels import REFUTATION_LEVEL
 from accelstudy.campaign.calibration.fit import JudgedNoise
-from accelstudy.diagnosis.decision.posterior import Case
+from accelstudy.campaign.session import Campaign
 from accelstudy.diagnosis.decision.problem import Problem, is_exact
 from accelstudy.diagnosis.evidence.noise_tests import (
     AXES,
@@ -29,8 +30,10 @@ from accelstudy.diagnosis.evidence.noise_tests import (
 )
 from accelstudy.diagnosis.rules import RULES
 from accelstudy.diagnosis.space.frame import SessionFit
-from accelstudy.diagnosis.space.hypotheses import LackOfFit, Spaces, clusters
+from accelstudy.diagnosis.space.hypotheses import clusters, space_of_attitudes
 from accelstudy.diagnosis.space.residuals import Residuals
+
+Array = NDArray[np.float64]
 
 SPECIFIC = (STEPS, COLOUR, AXES, TAILS, LEVEL)
 """What may be wrong with the noise, the most specific first."""
@@ -62,7 +65,7 @@ def misfit(problem: Problem, solution: Solution) -> Misfit | None:
     labels = clusters(problem.frame.forces)
     if len(labels) != len(solution.misclosures) or len(np.unique(labels)) == len(labels):
         return than_stated
-    square, freedom = _square_of_repeats(left, LackOfFit.of(left, labels))
+    square, freedom = _square_of_repeats(left, space_of_attitudes(left, labels))
     if not freedom or (stated and special.chdtrc(freedom, square) >= REFUTATION_LEVEL / 2):
         return than_stated
     if _lack_of_fit(left, square, freedom) >= REFUTATION_LEVEL:
@@ -75,7 +78,7 @@ def lack_of_fit(problem: Problem) -> float:
     residuals, same = problem.residuals, problem.attitude
     if same is None:
         return 1.0
-    return _lack_of_fit(residuals, *_square_of_repeats(residuals, same))
+    return _lack_of_fit(residuals, *_square_of_repeats(residuals, same.vectors))
 
 
 def _lack_of_fit(residuals: Residuals, square: float, freedom: int) -> float:
@@ -87,18 +90,26 @@ def _lack_of_fit(residuals: Residuals, square: float, freedom: int) -> float:
     return float(special.fdtrc(rest, freedom, ratio))
 
 
-def _square_of_repeats(residuals: Residuals, same: Spaces) -> tuple[float, int]:
-    """Square of the differences of repeated positions, and its degrees of freedom."""
-    square = float(residuals.z @ residuals.z) - float(same.parts(residuals.z)[0])
-    return max(square, 0.0), residuals.redundancy - int(same.dims[0])
+def _square_of_repeats(residuals: Residuals, same: Array) -> tuple[float, int]:
+    """Square of the differences of repeated positions, and its degrees of freedom.
+
+    Parameters
+    ----------
+    residuals : Residuals
+    same : (m, l) array, orthonormal basis of what they have in common
+    """
+    z = residuals.z
+    square = float(z @ z - np.sum((z @ same) ** 2))
+    return max(square, 0.0), residuals.redundancy - same.shape[1]
 
 
-def tests_of_noise(case: Case, frame: SessionFit) -> tuple[NoiseTest, ...]:
+def tests_of_noise(
+    problem: Problem, campaign: Campaign, frame: SessionFit
+) -> tuple[NoiseTest, ...]:
     """All tests of the noise that a campaign allows, on the residuals of the base or final fit."""
-    campaign, problem, chance = case.campaign, case.problem, case.chance
     if is_exact(problem.base.solution):
         return ()
-    residuals, base = frame.residuals, problem.residuals
+    residuals, base, chance = frame.residuals, problem.residuals, problem.chance
     sigma, sigma_base = (float(np.mean(one.sigmas[:, :3])) for one in (residuals, base))
     # With a sigma far too large, the attitudes would look like steps.
     least = sigma_base * min(1.0, float(np.sqrt(base.variance)))
@@ -116,10 +127,8 @@ def tests_of_noise(case: Case, frame: SessionFit) -> tuple[NoiseTest, ...]:
 
 def level_test_of(problem: Problem, frame: SessionFit) -> NoiseTest:
     """Test the level of the noise; the base fit by its own Ω, as the calibration does."""
-    if frame is problem.frame:
-        base = problem.base.solution
-        return level_test(Residuals.of(base), base.sigma_dof)
-    return level_test(frame.residuals, frame.solution.sigma_dof)
+    fit = problem.base.solution if frame is problem.frame else frame.solution
+    return level_test(Residuals.of(fit), fit.sigma_dof)
 
 
 def judged_noise(problem: Problem, frame: SessionFit) -> JudgedNoise:

@@ -1,26 +1,50 @@
-"""What a diagnosis has to explain: the fit of the base model, and all that it may lack."""
+"""What a diagnosis has to explain: the fit of the base model, and all that may be missing from it.
+
+Each piece of the evidence is weighed when it is asked for, and then kept.
+"""
 
 from __future__ import annotations
 
+from collections.abc import Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy import special
 
-from accelstudy.adjustment.quality import Solution, solve
+from accelstudy.adjustment.quality import Solution, column_basis, solve
 from accelstudy.approaches import Approach
 from accelstudy.basics.errors import InputError
 from accelstudy.campaign.calibration.fit import fit_campaign, least_sigma
 from accelstudy.campaign.session import Campaign
-from accelstudy.diagnosis.evidence.candidates import UNKNOWN, Field
-from accelstudy.diagnosis.evidence.noise_models import UnequalAxes
-from accelstudy.diagnosis.evidence.size import Evidence, Level
+from accelstudy.diagnosis.decision.posterior import NOT_LISTED, Explanation, Posterior
+from accelstudy.diagnosis.decision.refits import best_refit
+from accelstudy.diagnosis.evidence.candidates import (
+    Cause,
+    Field,
+    Singles,
+    classes_of,
+    equivalents,
+    unknown_beside,
+    weigh_singles,
+)
+from accelstudy.diagnosis.evidence.detection import Chance, Detection, detect
+from accelstudy.diagnosis.evidence.noise_models import UnequalAxes, colour_densities
+from accelstudy.diagnosis.evidence.noise_tests import (
+    AXES,
+    COLOUR,
+    LEVEL,
+    TAILS,
+    most_evidence,
+    tail_test,
+)
+from accelstudy.diagnosis.evidence.sets import set_prior, weigh_sets
+from accelstudy.diagnosis.evidence.size import Evidence, Level, log_mean
 from accelstudy.diagnosis.rules import RULES
-from accelstudy.diagnosis.space.examined import ExaminedFit, examine
 from accelstudy.diagnosis.space.frame import SessionFit
-from accelstudy.diagnosis.space.hypotheses import LackOfFit, lack_of_fit
+from accelstudy.diagnosis.space.hypotheses import Spaces, cosines, repeats_of
 from accelstudy.diagnosis.space.residuals import Residuals
 from accelstudy.diagnosis.space.shapes import LearnedShapes
 from accelstudy.sensors.sensor import SensorModel
@@ -29,6 +53,11 @@ Array = NDArray[np.float64]
 
 ROUNDING = 1e-10
 """Residuals below this share of gravity are rounding errors, and no measurement."""
+MAX_POSITIONS = 1000
+"""Positions of a campaign, whose residuals are compared pair by pair."""
+
+
+# --- the fit ------------------------------------------------------------------------------------
 
 
 @dataclass(frozen=True)
@@ -64,8 +93,14 @@ def fit_base(campaign: Campaign, model: SensorModel, approach: Approach) -> Base
     Raises
     ------
     InputError
-        If the positions do not determine the model, or leave no redundancy to test anything.
+        If the positions do not determine the model, leave no redundancy to test anything, or are
+        too many.
     """
+    if campaign.n_positions > MAX_POSITIONS:
+        raise InputError(
+            f"{campaign.name}: a diagnosis compares at most {MAX_POSITIONS} positions, and there "
+            f"are {campaign.n_positions}; give a part of them, or the means of repeated ones"
+        )
     stated, measured = campaign.sigma_force is not None, campaign
     # Without a sigma the weights of forces and angles need one: that of the residuals.
     for _ in range(1 if stated else 3):
@@ -95,28 +130,33 @@ def fit_base(campaign: Campaign, model: SensorModel, approach: Approach) -> Base
     return BaseFit(solve(fit.model, fit.approach, observed), Level.of_holds(), within)
 
 
+def is_exact(fit: Solution) -> bool:
+    """Whether a campaign is its own model, so that only rounding errors are left."""
+    return float(np.sqrt(np.mean(fit.misclosures**2))) < ROUNDING * fit.gravity
+
+
+# --- all that may be missing --------------------------------------------------------------------
+
+
 @dataclass(frozen=True)
 class Problem:
-    """A fit and all that its model may lack.
+    """A fit, all that its model may lack or that may be wrong with its noise, and the evidence.
 
     Attributes
     ----------
     base : BaseFit, with equal axes
-    examined : ExaminedFit, the same with unequal axes weighted, and the hypotheses about it
+    frame : SessionFit, the same with unequal axes weighted
+    seed : SeedSequence, of the simulated noise
     """
 
     base: BaseFit
-    examined: ExaminedFit
-
-    @property
-    def frame(self) -> SessionFit:
-        """Session of the fit."""
-        return self.examined.frame
+    frame: SessionFit
+    seed: np.random.SeedSequence
 
     @property
     def residuals(self) -> Residuals:
         """Residuals of the fit."""
-        return self.examined.frame.residuals
+        return self.frame.residuals
 
     @cached_property
     def evidence(self) -> Evidence:
@@ -124,14 +164,14 @@ class Problem:
         return Evidence(self.base.level, self.residuals.redundancy)
 
     @cached_property
-    def attitude(self) -> LackOfFit | None:
+    def attitude(self) -> Spaces | None:
         """All that repeated positions have in common; None if the noise does not show by itself."""
-        return lack_of_fit(self.residuals, self.frame.forces)
+        return repeats_of(self.residuals, self.frame.forces)
 
     @cached_property
     def unknown(self) -> LearnedShapes | None:
         """Something without a name; None where nothing but the candidates shows."""
-        shapes = LearnedShapes.of(self.frame, self.attitude) if self.examined.candidates else None
+        shapes = LearnedShapes.of(self.frame, self.attitude) if self.frame.candidates else None
         return shapes if shapes is not None and shapes.places else None
 
     @property
@@ -143,13 +183,106 @@ class Problem:
     @cached_property
     def named_field(self) -> Field:
         """All candidates that have names."""
-        return Field(self.examined.candidates)
+        return Field(self.frame.candidates)
 
     @cached_property
     def field(self) -> Field:
         """All candidates."""
-        unknown = {} if self.unknown is None else {UNKNOWN: self.unknown}
-        return Field({**self.examined.candidates, **unknown})
+        return Field(self.frame.candidates, self.unknown)
+
+    def best_odds(self, field: Field) -> float:
+        """Log odds of the most probable single thing that is missing against nothing, or 0."""
+        if not field.candidates:
+            return 0.0
+        prior = np.full(len(field.names), 1 / len(field.candidates))
+        if field.unknown is not None:
+            prior[-1] = self.prior_unknown
+        odds = field.odds(self.evidence, field.project(self.residuals.z)) + np.log(prior)
+        return max(0.0, float(np.max(odds)))
+
+    # --- effects ----------------------------------------------------------------------------
+
+    @cached_property
+    def singles(self) -> Singles:
+        """Evidence for each candidate by itself."""
+        return weigh_singles(self.frame, self.evidence)
+
+    @cached_property
+    def members(self) -> Mapping[str, tuple[str, ...]]:
+        """Names that mean the same as each candidate."""
+        return equivalents(self.frame, self.singles)
+
+    @cached_property
+    def classes(self) -> list[Cause]:
+        """Candidates with those that mean the same, strongest evidence first."""
+        return classes_of(self.singles, self.members)
+
+    @cached_property
+    def alone(self) -> list[Explanation]:
+        """Explanations by one effect, one outlying position, or something unknown."""
+        each, unknown = -np.log(max(len(self.classes), 1)), self.unknown
+        densities = self.singles.densities
+        alone = [Explanation((one,), densities[one.name] + each) for one in self.classes]
+        if unknown is not None:
+            z = self.residuals.z
+            density = unknown.log_density(self.evidence, unknown.parts(z), z @ z)
+            alone.append(Explanation((NOT_LISTED,), float(density + np.log(self.prior_unknown))))
+        return alone
+
+    @cached_property
+    def sets(self) -> list[Explanation]:
+        """Explanations by two or three effects or outlying positions."""
+        k, weighed = len(self.classes), list[Explanation]()
+        if k < 2:
+            return weighed
+        sets = weigh_sets(self.singles.shapes, self.residuals, self.evidence)
+        logs = [one.log_density + set_prior(len(one.best), k) for one in sets]
+        least = max(logs, default=0.0) - RULES.negligible
+        called = {name: one.name for one in self.classes for name in one.members}
+        strength = self.singles.densities
+        for one, log in zip(sets, logs, strict=True):
+            if log < least:
+                continue
+            best = sorted(one.best, key=lambda h: -strength[h.name])
+            effects = [self.members[h.name] for h in best if h.effect is not None]
+            if len(set(effects)) == len(effects):
+                named = (Cause(called.get(h.name, h.name), self.members[h.name], h) for h in best)
+                weighed.append(Explanation(tuple(named), log))
+        return weighed
+
+    @cached_property
+    def with_unknown(self) -> list[Explanation]:
+        """Explanations by something unknown beside the strongest effects and pairs of effects."""
+        weighed = list[Explanation]()
+        if len(self.classes) < 2 or self.unknown is None:
+            return weighed
+        singles = [one for one in self.alone if one.best]
+        least = max(one.log_weight for one in (*self.alone, *self.sets)) - RULES.sets_within
+        pairs = [one for one in self.sets if len(one.best) == 2 and one.log_weight > least]
+        pairs.sort(key=lambda one: -one.log_weight)
+        prior = float(np.log(RULES.prior_two * self.prior_unknown))
+        for one in (*singles[: RULES.unknown_beside], *pairs[: RULES.unknown_beside]):
+            basis = column_basis(np.concatenate([h.basis for h in one.best], axis=1))
+            log = unknown_beside(basis, self.unknown, self.residuals, self.evidence)
+            if log is not None:
+                weighed.append(Explanation((*one.causes, NOT_LISTED), one.log_weight + log + prior))
+        return weighed
+
+    def refit(self, chosen: Sequence[Cause]) -> tuple[tuple[Cause, ...], Solution] | None:
+        """Fit with those that mean the same as causes and fit best; None without a solution."""
+        return best_refit(self.frame, self.singles, chosen)
+
+    def cosine(self, name: str, other: str) -> float:
+        """Canonical cosine of the best shapes of two candidates; 0 of what is no candidate."""
+        one, two = (self.singles.best.get(each) for each in (name, other))
+        return 0.0 if one is None or two is None else float(cosines(one.ideal, two.ideal)[0])
+
+    # --- noise ------------------------------------------------------------------------------
+
+    @cached_property
+    def chance(self) -> Chance:
+        """Residuals without any effect."""
+        return Chance(self.seed, len(self.base.solution.design))
 
     @cached_property
     def axes(self) -> UnequalAxes:
@@ -163,25 +296,61 @@ class Problem:
         """Log odds that nothing is wrong but the noise of the axes, against nothing."""
         return float(np.log(RULES.prior_axes) + self.axes.log_evidence)
 
-    def best_odds(self, field: Field) -> float:
-        """Log odds of the most probable single thing that is missing against nothing, or 0."""
-        if not field.names:
-            return 0.0
-        prior = np.full(len(field.names), 1 / len(field.named_shapes))
-        if UNKNOWN in field.names:
-            prior[-1] = self.prior_unknown
-        odds = field.odds(self.evidence, field.project(self.residuals.z)) + np.log(prior)
-        return max(0.0, float(np.max(odds)))
+    @cached_property
+    def noises(self) -> list[Explanation]:
+        """Explanations by wrong noise alone, one of each kind."""
+        by_level = self.detection.noise
+        nothing = float(np.logaddexp.reduce(by_level))
+        # Weighted axes need no further evidence that they differ.
+        weighted = self.frame.solution is not self.base.solution
+        tails = most_evidence(tail_test(self.residuals, self.chance).p_value)
+        logs = {
+            COLOUR: np.log(RULES.prior_coloured) + log_mean(self._colours),
+            AXES: by_level[0] if weighted else nothing + self.unequal_axes,
+            TAILS: nothing + np.log(RULES.prior_tails) + tails,
+        }
+        if len(by_level) > 1:
+            # More noise than within the holds is an offset from hold to hold.
+            name = LEVEL if self.evidence.level.known else COLOUR
+            logs[name] = np.logaddexp(logs.get(name, -np.inf), by_level[1])
+        return [Explanation((Cause(name, (name,)),), float(log)) for name, log in logs.items()]
+
+    @property
+    def slow(self) -> float:
+        """Probability that the noise lasts for some holds, by the evidence alone."""
+        by_level, weights = self.detection.noise, self.evidence.level.weights
+        fast = max((self._colours[0], *(by_level[1:] - np.log(weights[1:]))))
+        return float(special.expit(log_mean(self._colours[1:]) - fast))
+
+    @cached_property
+    def _colours(self) -> Array:
+        """Log densities of the residuals with coloured noise, by its length."""
+        return colour_densities(self.residuals, self.evidence)
+
+    # --- whether, and what ------------------------------------------------------------------
+
+    @cached_property
+    def detection(self) -> Detection:
+        """Whether anything is missing, all candidates together."""
+        return detect(self.field, self.evidence, self.residuals, self.chance)
+
+    @cached_property
+    def posterior(self) -> Posterior:
+        """Probabilities of everything that may be missing or wrong."""
+        return Posterior.of([*self.alone, *self.sets, *self.with_unknown, *self.noises])
 
 
-def pose(base: BaseFit) -> Problem:
+SEED = np.random.SeedSequence(1)
+
+
+def pose(base: BaseFit, seed: np.random.SeedSequence = SEED) -> Problem:
     """Return the problem that a fit poses: its residuals, and all that its model may lack.
 
     The axes are weighted by their noise where unequal axes explain the residuals better than equal
     ones do, with nothing missing, with any single effect, or with something unknown.
     """
     first = base.solution
-    problem = Problem(base, examine(first))
+    problem = Problem(base, SessionFit.of(first), seed)
     if is_exact(first):
         return problem
     noisier = problem.unequal_axes
@@ -194,10 +363,6 @@ def pose(base: BaseFit) -> Problem:
         observed = replace(first.observed, sigma_force=shaped)
         # With other weights a sensor that clips may have no solution.
         with suppress(InputError):
-            return Problem(base, examine(solve(first.model, first.approach, observed)))
+            weighted = SessionFit.of(solve(first.model, first.approach, observed))
+            return Problem(base, weighted, seed)
     return problem
-
-
-def is_exact(fit: Solution) -> bool:
-    """Whether a campaign is its own model, so that only rounding errors are left."""
-    return float(np.sqrt(np.mean(fit.misclosures**2))) < ROUNDING * fit.gravity

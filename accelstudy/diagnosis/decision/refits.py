@@ -14,7 +14,7 @@ from accelstudy.adjustment.quality import Solution, solve
 from accelstudy.basics.errors import InputError
 from accelstudy.diagnosis.evidence.candidates import Cause, Singles, reshape
 from accelstudy.diagnosis.rules import RULES
-from accelstudy.diagnosis.space.examined import ExaminedFit
+from accelstudy.diagnosis.space.frame import SessionFit
 from accelstudy.diagnosis.space.hypotheses import Hypothesis
 from accelstudy.sensors.models import composition_name
 from accelstudy.sensors.sensor import SensorModel
@@ -53,7 +53,7 @@ def refit(base: Solution, chosen: Sequence[Hypothesis]) -> Solution | None:
 
 
 def best_refit(
-    examined: ExaminedFit, singles: Singles, chosen: Sequence[Cause]
+    frame: SessionFit, singles: Singles, chosen: Sequence[Cause]
 ) -> tuple[tuple[Cause, ...], Solution] | None:
     """Fit with the members of classes that fit best, by their own names; None without a solution.
 
@@ -61,7 +61,7 @@ def best_refit(
 
     Parameters
     ----------
-    examined : ExaminedFit, of the base fit
+    frame : SessionFit, of the base fit
     singles : Singles, of the same
     chosen : causes, each with a shape
     """
@@ -73,8 +73,8 @@ def best_refit(
         ]
         for one in chosen
     ]
-    sharp = [_sharpen(examined, one) for one in product(*alternatives)]
-    base = examined.frame.solution
+    sharp = [_sharpen(frame, one) for one in product(*alternatives)]
+    base = frame.solution
     solved = [(one, fit) for one in sharp if (fit := refit(base, one)) is not None]
     if not solved:
         return None
@@ -84,7 +84,7 @@ def best_refit(
     u = len(fit.parameters)
     named = zip(chosen, best, strict=True)
     causes = tuple(Cause(h.name, one.members, h, one.posterior) for one, h in named)
-    return causes, replace(fit, cofactors=with_settings(examined, fit, best)[:u, :u])
+    return causes, replace(fit, cofactors=with_settings(frame, fit, best)[:u, :u])
 
 
 STEP = 1e-4
@@ -92,7 +92,7 @@ STEP = 1e-4
 
 
 def with_settings(
-    examined: ExaminedFit, fit: Solution, chosen: Sequence[Hypothesis]
+    frame: SessionFit, fit: Solution, chosen: Sequence[Hypothesis]
 ) -> NDArray[np.float64]:
     """Cofactors of a fit, with those of the settings that were searched for.
 
@@ -101,7 +101,7 @@ def with_settings(
 
     Parameters
     ----------
-    examined : ExaminedFit, of the base fit
+    frame : SessionFit, of the base fit
     fit : Solution, with what was chosen
     chosen : hypotheses
 
@@ -126,7 +126,7 @@ def with_settings(
             psi.append(problem.linearise(fit.parameters[None], at[None]).psi[:, 0].T)
         slope = np.linalg.solve(fit.whitening, (psi[1] - psi[0])[..., None] / (2 * STEP)).ravel()
         columns.append(np.pad(slope, (0, len(fit.design) - len(slope)))[:, None])
-        tried = _values(examined, one)
+        tried = _values(frame, one)
         low, high = min(tried), max(tried)
         if low == high:  # the only one that shows: it was searched for on either side
             low, high = low / RANGE_FACTOR, high * RANGE_FACTOR
@@ -140,26 +140,26 @@ def with_settings(
     return np.asarray(np.linalg.inv(normal) / np.outer(size, size))
 
 
-def _values(examined: ExaminedFit, hypothesis: Hypothesis) -> list[float]:
+def _values(frame: SessionFit, hypothesis: Hypothesis) -> list[float]:
     """Values of the smooth setting of an effect that are tried at first."""
-    values = (h.value for h in examined.candidates[hypothesis.name])
+    values = (h.value for h in frame.candidates[hypothesis.name].hypotheses)
     return [value for value in values if not np.isnan(value)]
 
 
-def _sharpen(examined: ExaminedFit, chosen: Sequence[Hypothesis]) -> list[Hypothesis]:
+def _sharpen(frame: SessionFit, chosen: Sequence[Hypothesis]) -> list[Hypothesis]:
     """Search the settings of smooth effects by refits: a large effect is not of first order."""
-    sharp, base = list(chosen), examined.frame.solution
+    sharp, base = list(chosen), frame.solution
     for k, start in enumerate(chosen):
         if start.smooth is None:
             continue
         from scipy.optimize import minimize_scalar  # slow to import, and seldom needed
 
-        values = _values(examined, start)
+        values = _values(frame, start)
         passed = {min(values) / RANGE_FACTOR, max(values) * RANGE_FACTOR}
         ends = (*passed, *values)
 
         def omega(log: float, k: int = k, start: Hypothesis = start) -> float:
-            trial = reshape(examined, start, float(np.exp(log)))
+            trial = reshape(frame, start, float(np.exp(log)))
             if trial is None:
                 return base.omega
             fit = refit(base, [*sharp[:k], trial, *sharp[k + 1 :]])
@@ -178,7 +178,7 @@ def _sharpen(examined: ExaminedFit, chosen: Sequence[Hypothesis]) -> list[Hypoth
             if inside or near in passed or omega(float(np.log(near))) > least.fun:
                 break
             at, passed = near, passed | {low, high}
-        best = reshape(examined, start, float(np.exp(least.x)))
+        best = reshape(frame, start, float(np.exp(least.x)))
         if best is not None and least.fun < omega(float(np.log(start.value))):
             sharp[k] = best
     return sharp

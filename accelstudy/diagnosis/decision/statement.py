@@ -82,8 +82,8 @@ class Statement:
         names stands for nothing. Empty if nothing is beside them
     """
 
-    certain: tuple[Part, ...]
-    open: tuple[Explanation, ...]
+    certain: tuple[Part, ...] = ()
+    open: tuple[Explanation, ...] = ()
 
 
 def statement_of(

@@ -12,15 +12,10 @@ import numpy as np
 from accelstudy.adjustment.quality import Solution, global_test
 from accelstudy.basics.levels import REFUTATION_LEVEL
 from accelstudy.diagnosis.decision.noise import lack_of_fit, misfit
-from accelstudy.diagnosis.decision.posterior import (
-    Case,
-    Explanation,
-    Posterior,
-    is_large,
-    posterior_by_refits,
-)
-from accelstudy.diagnosis.decision.problem import Problem
+from accelstudy.diagnosis.decision.posterior import NOT_LISTED, Explanation, Posterior
+from accelstudy.diagnosis.decision.problem import Problem, pose
 from accelstudy.diagnosis.decision.statement import Part, Statement, statement_of
+from accelstudy.diagnosis.evidence.bounds import within_bounds
 from accelstudy.diagnosis.evidence.candidates import UNKNOWN, Cause
 from accelstudy.diagnosis.evidence.noise_tests import COLOUR, LEVEL, NOISES, STEPS, NoiseTest
 from accelstudy.diagnosis.prediction import HeldOutGap
@@ -32,7 +27,7 @@ from accelstudy.sensors.plausibility import impossible_parameters
 
 
 class Reason(NamedTuple):
-    """Why a verdict is what it is.
+    """Why a verdict is what it is; empty where it needs no reason.
 
     Attributes
     ----------
@@ -40,8 +35,8 @@ class Reason(NamedTuple):
     facts : mapping, names and numbers of the sentence for it, which `report/words.txt.j2` has
     """
 
-    code: str
-    facts: Mapping[str, Any]
+    code: str = ""
+    facts: Mapping[str, Any] = {}
 
     @classmethod
     def of(cls, code: str, **facts: Any) -> Reason:
@@ -58,9 +53,9 @@ class Finding:
     verdict : str, "no_effect", "named", "narrowed", "learned", "gross_error", "noise_model" or
         "unknown"
     frame : SessionFit, of the fit with what was chosen, or of the base fit
-    reason : Reason or None
+    reason : Reason
     chosen : tuple of Cause; of the unknown, what is certain
-    posterior : Posterior or None, where something is missing
+    posterior : Posterior, empty where nothing is missing
     statement : Statement, what is missing whatever else is open, and what may be beside that
     place : Place or None, coordinate and target of a learned function, which is the first chosen
     without_function : Finding or None, what is said without that function
@@ -68,17 +63,17 @@ class Finding:
 
     verdict: str
     frame: SessionFit
-    reason: Reason | None = None
+    reason: Reason = field(default=Reason())
     chosen: tuple[Cause, ...] = ()
-    posterior: Posterior | None = None
-    statement: Statement = field(default=Statement((), ()))
+    posterior: Posterior = field(default=Posterior())
+    statement: Statement = field(default=Statement())
     place: Place | None = None
     without_function: Finding | None = None
 
     @property
-    def code(self) -> str:
-        """Code of the reason; empty if there is none."""
-        return "" if self.reason is None else self.reason.code
+    def credible_set(self) -> tuple[Explanation, ...]:
+        """Smallest set of explanations that holds what is missing."""
+        return self.posterior.credible_set
 
     @property
     def alternatives(self) -> tuple[Explanation, ...]:
@@ -90,36 +85,31 @@ class Finding:
         alternatives = product(*(part.names for part in parts))
         return tuple(Explanation(one, posterior=parts[0].posterior) for one in alternatives)
 
-    @property
-    def credible_set(self) -> tuple[Explanation, ...]:
-        """Smallest set of explanations that holds what is missing."""
-        return () if self.posterior is None else self.posterior.credible_set
-
 
 # --- something is missing -----------------------------------------------------------------------
 
 
-def explain(case: Case) -> Finding:
+def explain(problem: Problem) -> Finding:
     """Find the explanation, or the few, of what is missing; "unknown" where none is enough."""
-    posterior = case.posterior
+    posterior = problem.posterior
     single = next((one for one in posterior.all if len(one.best) == 1), None)
-    if single is not None and is_large(case.problem, single):
-        posterior = posterior_by_refits(case, single, 1)
-    finding = _judge(case, posterior)
-    if finding.code == "misfit" and single is not None:
+    if single is not None and is_large(problem, single):
+        posterior = posterior_by_refits(problem, single, 1)
+    finding = _judge(problem, posterior)
+    if finding.reason.code == "misfit" and single is not None:
         # To first order the best explanation was enough; the others were not asked by their refits.
-        posterior = posterior_by_refits(case, single, RULES.refitted_sets)
-        finding = _judge(case, posterior)
+        posterior = posterior_by_refits(problem, single, RULES.refitted_sets)
+        finding = _judge(problem, posterior)
     return finding
 
 
-def _judge(case: Case, posterior: Posterior) -> Finding:
+def _judge(problem: Problem, posterior: Posterior) -> Finding:
     """Judge the explanations of a posterior: the first rule that matches."""
-    frame, top = case.problem.frame, posterior.reported[0]
+    frame, top = problem.frame, posterior.reported[0]
     if top.best:
-        fit = case.refit(top.causes)
-        reason = _against(case.problem, top, fit)
-        if fit is None or reason is not None:
+        fit = problem.refit(top.causes)
+        reason = _against(problem, top, fit)
+        if fit is None or reason.code:
             return Finding("unknown", frame, reason, posterior=posterior)
         found = [replace(cause, posterior=top.posterior) for cause in fit[0]]
         found.sort(key=lambda one: one.shape.effect is not None)
@@ -133,7 +123,7 @@ def _judge(case: Case, posterior: Posterior) -> Finding:
         elif (sure or len(credible) <= RULES.many) and of_effects >= RULES.sure:
             verdict = "narrowed"
         if verdict:
-            return Finding(verdict, SessionFit.of(fit[1]), None, tuple(found), posterior)
+            return Finding(verdict, SessionFit.of(fit[1]), Reason(), tuple(found), posterior)
     if top.is_noise and top.posterior >= RULES.sure:
         reason = Reason.of("noise", name=top.names[0], remark=NOISES[top.names[0]])
         return Finding("noise_model", frame, reason, posterior=posterior)
@@ -143,15 +133,15 @@ def _judge(case: Case, posterior: Posterior) -> Finding:
 
 def _against(
     problem: Problem, top: Explanation, fit: tuple[tuple[Cause, ...], Solution] | None
-) -> Reason | None:
-    """Why an explanation cannot be the answer, however probable; None if it can."""
+) -> Reason:
+    """Why an explanation cannot be the answer, however probable; empty if it can."""
     if fit is None:
         return Reason.of("no solution", names=top.names)
     if left := misfit(problem, fit[1]):
         return Reason.of("misfit", names=top.names, left=left)
     if beyond := impossible(fit[1]):
         return Reason.of("impossible", names=top.names, beyond=beyond)
-    return None
+    return Reason()
 
 
 def impossible(solution: Solution) -> list[str]:
@@ -161,21 +151,82 @@ def impossible(solution: Solution) -> list[str]:
     return impossible_parameters(solution.model.effects, solution.parameters[:u], sigma[:u])
 
 
-def dismiss_weak_evidence(case: Case, finding: Finding) -> Finding | None:
+def dismiss_weak_evidence(problem: Problem, finding: Finding) -> Finding | None:
     """Find "no effect" where the calibration is right to accept its fit; None elsewhere.
 
     The evidence for something is wider than the test of the calibration, and its level less strict.
     What it finds beyond that level counts if something of it has a name, or is certain.
     """
-    if not case.problem.evidence.level.known or case.detection.p_value < REFUTATION_LEVEL:
+    if not problem.evidence.level.known or problem.detection.p_value < REFUTATION_LEVEL:
         return None
-    base = case.problem.base.solution
+    base = problem.base.solution
     test = global_test(base.omega, base.redundancy, sigma_dof=base.sigma_dof)
     if test is None or not test.accepted or test.powerless:
         return None
     if any(part.is_effect for part in finding.statement.certain):
         return None
-    return Finding("no_effect", case.problem.frame, Reason.of("weak", p=case.detection.p_value))
+    return Finding("no_effect", problem.frame, Reason.of("weak", p=problem.detection.p_value))
+
+
+# --- what is large: to first order it leaves so much that anything seems to be beside it --------
+
+
+def is_large(problem: Problem, single: Explanation) -> bool:
+    """Whether an effect is so large that its signature to first order is not enough."""
+    z, basis = problem.residuals.z, single.best[0].basis
+    return single.best[0].effect is not None and float(np.sum((z @ basis) ** 2)) > RULES.large
+
+
+def posterior_by_refits(problem: Problem, single: Explanation, count: int) -> Posterior:
+    """Posterior by refits: of an effect alone, with more in what its refit leaves, and of sets.
+
+    Parameters
+    ----------
+    problem : Problem
+    single : Explanation, the effect
+    count : int, sets of candidates that are refitted, the most probable to first order
+    """
+    tried = [single, *sorted(problem.sets, key=lambda one: -one.log_weight)[:count]]
+    refitted = [_weigh_by_refit(problem, one) for one in tried]
+    alone, solution = refitted[0]
+    weighed = [one for one, _ in refitted]
+    if solution is not None:
+        weighed += _pairs_with(problem, alone, solution)
+    others = [one for one in problem.alone if one.names != single.names]
+    return Posterior.of([*weighed, *others, *problem.noises])
+
+
+def _weigh_by_refit(problem: Problem, one: Explanation) -> tuple[Explanation, Solution | None]:
+    """Weigh an explanation by its refit instead of by first order."""
+    fit = problem.refit(one.causes)
+    if fit is None:
+        return one, None
+    refitted, solution = fit
+    z, basis = problem.residuals.z, np.concatenate([h.basis for h in one.best], axis=1)
+    left = z - basis @ np.linalg.lstsq(basis, z, rcond=None)[0]
+    gain = max(float(left @ left) - solution.omega, 0.0)
+    parts = float(z @ z - left @ left) + np.array([0.0, gain])
+    first, refit = problem.evidence.spaces_density(parts, [basis.shape[1]] * 2, z @ z)
+    weight = one.log_weight + float(refit - first)
+    both = zip(one.causes, refitted, strict=True)
+    causes = tuple(replace(cause, best=other.best) for cause, other in both)
+    return Explanation(causes, weight), solution
+
+
+def _pairs_with(problem: Problem, alone: Explanation, solution: Solution) -> list[Explanation]:
+    """One effect with another one, or with something unknown, in what its refit leaves."""
+    inner, weighed = pose(replace(problem.base, solution=solution)), list[Explanation]()
+    z = inner.residuals.z
+    odds = inner.field.odds(inner.evidence, inner.field.project(z)) + alone.log_weight
+    for name, log in zip(inner.field.names, odds.tolist(), strict=True):
+        cause, more = NOT_LISTED, np.log(inner.prior_unknown)
+        if name != UNKNOWN:
+            other = inner.frame.candidates[name].strongest(z)
+            cause = Cause(name, inner.members[name], other)
+            more = within_bounds((other,), z, inner.evidence)[0] - np.log(len(problem.classes))
+        weight = log + float(more + np.log(RULES.prior_two))
+        weighed.append(Explanation((*alone.causes, cause), weight))
+    return weighed
 
 
 # --- what is certain, whatever else is open -----------------------------------------------------
@@ -186,68 +237,69 @@ def dismiss_weak_evidence(case: Case, finding: Finding) -> Finding | None:
 # the effect explains nearly all there is; what explains less is doubted.
 
 
-def add_certain_effects(case: Case, finding: Finding) -> Finding:
+def add_certain_effects(problem: Problem, finding: Finding) -> Finding:
     """Say what is certain, and add it to the fit whatever else is missing."""
     posterior = finding.posterior
-    assert posterior is not None
     if finding.verdict != "unknown":
-        return replace(finding, statement=statement_of(finding.credible_set, case.cosine))
+        return replace(finding, statement=statement_of(finding.credible_set, problem.cosine))
     beyond = sum(one.posterior for one in posterior.all if UNKNOWN in one.names)
-    if finding.code == "misfit" or beyond > 1 - RULES.credible:
-        posterior = posterior.doubting(_perhaps_imitations(case, posterior))
-    says = statement_of(posterior.all, case.cosine)
+    if finding.reason.code == "misfit" or beyond > 1 - RULES.credible:
+        posterior = posterior.doubting(_perhaps_imitations(problem, posterior))
+    says = statement_of(posterior.all, problem.cosine)
     finding = replace(finding, posterior=posterior, statement=says)
-    chosen = [cause for _, cause in _certain_effects(case, posterior, says)]
+    chosen = [cause for _, cause in _certain_effects(problem, posterior, says)]
     if not chosen:
         return finding
-    fit = case.refit(chosen)
+    fit = problem.refit(chosen)
     if fit is None:
-        return replace(finding, statement=Statement((), ()))
+        return replace(finding, statement=Statement())
     return replace(finding, frame=SessionFit.of(fit[1]), chosen=fit[0])
 
 
-def _certain_effects(case: Case, posterior: Posterior, says: Statement) -> list[tuple[Part, Cause]]:
+def _certain_effects(
+    problem: Problem, posterior: Posterior, says: Statement
+) -> list[tuple[Part, Cause]]:
     """Components that are certain and effects, each with its most probable name."""
     chosen = []
     for part in says.certain:
         if (name := part.names[0]).name in effect_names():
             shapes = (h for one in posterior.all for h in one.best if h.name == name.name)
-            best = next(shapes, case.singles.best[name.name])
+            best = next(shapes, problem.singles.best[name.name])
             chosen.append((part, replace(name, best=best, posterior=part.posterior)))
     return chosen
 
 
-def _perhaps_imitations(case: Case, posterior: Posterior) -> set[str]:
+def _perhaps_imitations(problem: Problem, posterior: Posterior) -> set[str]:
     """Names of what seems certain, and yet does not explain nearly all that is left without it.
 
     More is missing than the catalogue explains. An effect of it may imitate what is in none, though
     hardly ever nearly all of that.
     """
-    seeming = _certain_effects(case, posterior, statement_of(posterior.all, case.cosine))
+    seeming = _certain_effects(problem, posterior, statement_of(posterior.all, problem.cosine))
     chosen, names = [cause for _, cause in seeming], set[str]()
-    after = _disagreement(case, chosen)
+    after = _disagreement(problem, chosen)
     for i, (part, _) in enumerate(seeming):
-        without = _disagreement(case, [*chosen[:i], *chosen[i + 1 :]])
+        without = _disagreement(problem, [*chosen[:i], *chosen[i + 1 :]])
         if after > (1 - RULES.nearly_all) * without:
             names |= {name.name for name in part.names}
     return names
 
 
-def _disagreement(case: Case, chosen: Sequence[Cause]) -> float:
+def _disagreement(problem: Problem, chosen: Sequence[Cause]) -> float:
     """Ω that a fit leaves beyond the given noise, all if none is given; ∞ without a solution."""
-    fit = case.refit(chosen) if chosen else ((), case.problem.frame.solution)
+    fit = problem.refit(chosen) if chosen else ((), problem.frame.solution)
     if fit is None:
         return np.inf
-    noise = fit[1].redundancy * float(case.problem.evidence.level.known)
+    noise = fit[1].redundancy * float(problem.evidence.level.known)
     return max(fit[1].omega - noise, 1e-9)
 
 
-def withdraw_refuted(case: Case, finding: Finding, held: HeldOutGap) -> Finding:
+def withdraw_refuted(problem: Problem, finding: Finding, held: HeldOutGap) -> Finding:
     """What is said where the held-out positions refute what was chosen: nothing of it is certain.
 
     Parameters
     ----------
-    case : Case
+    problem : Problem
     finding : Finding
     held : HeldOutGap
     """
@@ -255,19 +307,18 @@ def withdraw_refuted(case: Case, finding: Finding, held: HeldOutGap) -> Finding:
     if finding.verdict != "unknown":
         names = [cause.name for cause in finding.chosen]
         reason = Reason.of("refuted", names=names, before=held.before, after=held.after)
-    assert finding.posterior is not None
     doubted = [name for cause in finding.chosen for name in cause.members]
     posterior = finding.posterior.doubting(doubted)
-    says = Statement((), statement_of(posterior.all, case.cosine).open)
-    return Finding("unknown", case.problem.frame, reason, posterior=posterior, statement=says)
+    says = Statement((), statement_of(posterior.all, problem.cosine).open)
+    return Finding("unknown", problem.frame, reason, posterior=posterior, statement=says)
 
 
 # --- a test of the noise fails, though no effect was significant --------------------------------
 
 
-def judge_noise(case: Case, worst: NoiseTest) -> Finding:
+def judge_noise(problem: Problem, worst: NoiseTest) -> Finding:
     """Judge a failed test of the noise, when no effect was significant."""
-    problem, posterior = case.problem, case.posterior
+    posterior = problem.posterior
     verdict, name, noise = "noise_model", worst.name, posterior.p_noise
     reason = Reason.of("noise", name=name, remark=worst.remark)
     if lack_of_fit(problem) < REFUTATION_LEVEL and name != STEPS:
@@ -287,31 +338,31 @@ def judge_noise(case: Case, worst: NoiseTest) -> Finding:
 # model is adequate.
 
 
-def p_coloured(case: Case, finding: Finding) -> float:
+def p_coloured(problem: Problem, finding: Finding) -> float:
     """Probability of coloured noise that may be an effect of an absent column."""
     posterior = finding.posterior
-    if finding.verdict not in ("noise_model", "unknown") or posterior is None:
+    if finding.verdict not in ("noise_model", "unknown"):
         return 0.0
     slow = [one.posterior for one in posterior.all if one.names == (COLOUR,)]
-    return sum(slow) if case.problem.frame.absent else 0.0
+    return sum(slow) if problem.frame.absent else 0.0
 
 
-def reason_of_unrecorded(case: Case, finding: Finding) -> Reason | None:
+def reason_of_unrecorded(problem: Problem, finding: Finding) -> Reason | None:
     """Why noise, or nothing with a name, may be an effect of what was not recorded; else None."""
-    posterior, absent = finding.posterior, case.problem.frame.absent
-    if finding.verdict not in ("noise_model", "unknown") or not absent or posterior is None:
+    posterior, absent = finding.posterior, problem.frame.absent
+    if finding.verdict not in ("noise_model", "unknown") or not absent or not posterior.all:
         return None
-    slow, probability = case.slow, p_coloured(case, finding)
+    slow, probability = problem.slow, p_coloured(problem, finding)
     if finding.verdict == "noise_model":
         enough = probability >= posterior.p_noise / 2
     else:
-        enough = slow * probability + _p_courses(case.problem, posterior) >= RULES.sure
+        enough = slow * probability + _p_courses(problem, posterior) >= RULES.sure
     if not enough:
         return None
     noise = "slow"
     if finding.verdict != "unknown" and slow < RULES.sure:
         noise = "by hold" if slow <= 1 - RULES.sure else "either"
-    repeated = case.problem.attitude is not None
+    repeated = problem.attitude is not None
     return Reason.of(
         "unrecorded", noise=noise, absent=absent, repeated=repeated, why=finding.reason
     )
@@ -322,7 +373,7 @@ def _p_courses(problem: Problem, posterior: Posterior) -> float:
     courses = {name for name in effect_names() if get_effect(name).is_course}
     unknown = problem.unknown
     if unknown is not None:
-        places = unknown.place_densities_of(problem.evidence, problem.residuals.z)
+        places = unknown.place_densities(problem.evidence, problem.residuals.z)
         if max(places, key=places.__getitem__)[0] in ("time", "temperature"):
             courses.add(UNKNOWN)
     return sum(one.posterior for one in posterior.reported if courses.issuperset(one.names))

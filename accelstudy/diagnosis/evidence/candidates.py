@@ -13,15 +13,8 @@ from numpy.typing import NDArray
 from accelstudy.diagnosis.evidence.bounds import within_bounds
 from accelstudy.diagnosis.evidence.size import Evidence
 from accelstudy.diagnosis.rules import RULES
-from accelstudy.diagnosis.space.examined import ExaminedFit
-from accelstudy.diagnosis.space.hypotheses import (
-    BumpedPositions,
-    EffectShapes,
-    Hypotheses,
-    Hypothesis,
-    Shapes,
-    log_sum,
-)
+from accelstudy.diagnosis.space.frame import SessionFit
+from accelstudy.diagnosis.space.hypotheses import OUTLIER, Hypotheses, Hypothesis, Spaces, log_sum
 from accelstudy.diagnosis.space.residuals import Residuals
 from accelstudy.diagnosis.space.shapes import LearnedShapes
 
@@ -33,9 +26,10 @@ UNKNOWN = "unknown"
 
 
 class Projection(NamedTuple):
-    """What densities need of residuals: their parts by candidate, (..., p) each, and ‖z‖² (...)."""
+    """What densities need of residuals: parts in all named and unknown shapes, and ‖z‖²."""
 
-    parts: tuple[Array, ...]
+    parts: Array
+    of_unknown: Array
     squares: Array
 
 
@@ -45,47 +39,48 @@ class Field:
 
     Attributes
     ----------
-    candidates : dict of name to shapes, K; what has no name, if it is there, is the last one
+    candidates : dict of name to shapes, at least one
+    unknown : LearnedShapes or None, what has no name, the last candidate
     """
 
-    candidates: Mapping[str, Shapes]
-
-    @property
-    def names(self) -> tuple[str, ...]:
-        """Their names."""
-        return tuple(self.candidates)
+    candidates: Mapping[str, Hypotheses]
+    unknown: LearnedShapes | None = None
 
     @cached_property
-    def named_shapes(self) -> list[Hypotheses]:
-        """Shapes of the candidates that have names."""
-        return [one for one in self.candidates.values() if isinstance(one, Hypotheses)]
+    def names(self) -> tuple[str, ...]:
+        """Their names."""
+        return (*self.candidates, *([] if self.unknown is None else [UNKNOWN]))
+
+    @cached_property
+    def starts(self) -> Ints:
+        """First shape of each named candidate among all, and their number, (K + 1,)."""
+        return np.cumsum([0, *(len(one) for one in self.candidates.values())])
+
+    @cached_property
+    def spaces(self) -> Spaces:
+        """All shapes with names, side by side; the candidates are equally probable."""
+        each = [*self.candidates.values()]
+        return Spaces(
+            np.concatenate([one.prior for one in each]) / len(each),
+            tuple(share for one in each for share in one.shares),
+            np.concatenate([one.vectors for one in each], axis=1),
+        )
 
     def project(self, errors: Array) -> Projection:
         """What the densities need of residuals (..., m)."""
-        parts = tuple(shapes.parts(errors) for shapes in self.candidates.values())
-        return Projection(parts, np.sum(errors**2, axis=-1))
-
-    @cached_property
-    def _spaces(self) -> tuple[Ints, Array, Ints]:
-        """Dimensions and log prior of all named shapes, (s,), and where those of each begin."""
-        dims = np.concatenate([one.dims for one in self.named_shapes])
-        log_prior = np.log(np.concatenate([one.prior for one in self.named_shapes]))
-        return dims, log_prior, np.cumsum([0, *(len(one) for one in self.named_shapes[:-1])])
+        beyond = errors[..., :0] if self.unknown is None else self.unknown.parts(errors)
+        return Projection(self.spaces.parts(errors), beyond, np.sum(errors**2, axis=-1))
 
     def densities(self, evidence: Evidence, seen: Projection) -> Array:
         """Log density of residuals under each candidate, over its shapes, (..., K)."""
-        if not self.candidates:
-            return np.zeros((*np.shape(seen.squares), 0))
-        # All spaces at once, which takes half as long as one candidate after the other.
-        dims, log_prior, starts = self._spaces
-        parts = np.concatenate(seen.parts[: len(starts)], axis=-1)
-        logs = evidence.spaces_density(parts, dims, seen.squares) + log_prior
-        top = np.maximum.reduceat(logs, starts, axis=-1)
-        logs -= np.repeat(top, np.diff(starts, append=len(dims)), axis=-1)
-        each = top + np.log(np.add.reduceat(np.exp(logs), starts, axis=-1))
-        if UNKNOWN not in self.candidates:
+        starts, prior = self.starts, self.spaces.prior * len(self.candidates)
+        logs = self.spaces.logs(evidence, seen.parts, seen.squares) + np.log(prior)
+        top = np.maximum.reduceat(logs, starts[:-1], axis=-1)
+        logs -= np.repeat(top, np.diff(starts), axis=-1)
+        each = top + np.log(np.add.reduceat(np.exp(logs), starts[:-1], axis=-1))
+        if self.unknown is None:
             return np.asarray(each)
-        unknown = self.candidates[UNKNOWN].log_density(evidence, seen.parts[-1], seen.squares)
+        unknown = self.unknown.log_density(evidence, seen.of_unknown, seen.squares)
         return np.append(each, unknown[..., None], axis=-1)
 
     def odds(self, evidence: Evidence, seen: Projection) -> Array:
@@ -139,20 +134,22 @@ class Singles:
     best: Mapping[str, Hypothesis]
 
 
-def weigh_singles(examined: ExaminedFit, evidence: Evidence) -> Singles:
+def weigh_singles(frame: SessionFit, evidence: Evidence) -> Singles:
     """Weigh each candidate by itself."""
-    z, field = examined.frame.residuals.z, Field(examined.candidates)
-    densities = field.densities(evidence, field.project(z))
-    first = dict(zip(field.names, densities.tolist(), strict=True))
+    z, first = frame.residuals.z, dict[str, float]()
+    if frame.candidates:
+        field = Field(frame.candidates)
+        densities = field.densities(evidence, field.project(z))
+        first = dict(zip(field.names, densities.tolist(), strict=True))
     least = max(first.values(), default=0.0) - RULES.refined_within
     shapes, logs, best = dict[str, Hypotheses](), dict[str, Array](), dict[str, Hypothesis]()
-    for name, tried in examined.candidates.items():
+    for name, tried in frame.candidates.items():
         worth = first[name] > least
-        own = refine(examined, tried) if worth else tried
+        own = refine(frame, tried) if worth else tried
         parts = own.parts(z)
         shapes[name], logs[name] = own, own.logs(evidence, parts, z @ z)
         if worth and own[0].estimates is not None:
-            within = within_bounds([*own], z, evidence)
+            within = within_bounds(own.hypotheses, z, evidence)
             logs[name] = logs[name] + within
             parts = parts + 2 * within
         best[name] = own[int(np.argmax(parts))]
@@ -160,19 +157,19 @@ def weigh_singles(examined: ExaminedFit, evidence: Evidence) -> Singles:
     return Singles(shapes, logs, total, best)
 
 
-def equivalents(examined: ExaminedFit, singles: Singles) -> dict[str, tuple[str, ...]]:
+def equivalents(frame: SessionFit, singles: Singles) -> dict[str, tuple[str, ...]]:
     """Names that mean the same as each candidate in this campaign, itself included.
 
     They do if any shapes are the same between which the residuals do not decide.
     """
     members: dict[str, tuple[str, ...]] = {}
     for name, shapes in singles.shapes.items():
-        if isinstance(shapes, BumpedPositions):
+        if name == OUTLIER:
             members[name] = (name,)
             continue
         logs = singles.logs[name]
         probable = [shapes[int(i)] for i in np.flatnonzero(logs > logs.max() - RULES.undecided)]
-        members[name] = tuple(sorted({*examined.indistinguishable(probable), name}))
+        members[name] = tuple(sorted({*frame.indistinguishable(probable), name}))
     return members
 
 
@@ -193,31 +190,31 @@ def classes_of(singles: Singles, members: Mapping[str, tuple[str, ...]]) -> list
     return classes
 
 
-def refine(examined: ExaminedFit, shapes: Hypotheses) -> Hypotheses:
+def refine(frame: SessionFit, shapes: Hypotheses) -> Hypotheses:
     """Add shapes between the neighbours of the best one, and again between those."""
-    z = examined.frame.residuals.z
-    if not isinstance(shapes, EffectShapes) or len(shapes) < 2:
+    z = frame.residuals.z
+    if shapes[0].effect is None or len(shapes) < 2:
         return shapes
     if shapes[0].smooth is None:
-        return _complete(examined, shapes)
+        return _complete(frame, shapes)
     for _ in range(RULES.refinements):
         best = int(np.argmax(shapes.parts(z)))
         around = (shapes[max(best - 1, 0)].value, shapes[min(best + 1, len(shapes) - 1)].value)
         tried = _reshape_all(
-            examined, shapes[best], np.geomspace(*around, RULES.refined_shapes + 2)[1:-1]
+            frame, shapes[best], np.geomspace(*around, RULES.refined_shapes + 2)[1:-1]
         )
-        fine = [*shapes, *(h for h in tried if h is not None)]
-        shapes = EffectShapes.of(sorted(fine, key=lambda h: h.value))
+        fine = [*shapes.hypotheses, *(h for h in tried if h is not None)]
+        shapes = Hypotheses.of(sorted(fine, key=lambda h: h.value))
     return shapes
 
 
-def reshape(examined: ExaminedFit, hypothesis: Hypothesis, value: float) -> Hypothesis | None:
+def reshape(frame: SessionFit, hypothesis: Hypothesis, value: float) -> Hypothesis | None:
     """Return a smooth effect with another value of its setting; None if less of it shows."""
-    return _reshape_all(examined, hypothesis, [value])[0]
+    return _reshape_all(frame, hypothesis, [value])[0]
 
 
 def _reshape_all(
-    examined: ExaminedFit, hypothesis: Hypothesis, values: Iterable[float]
+    frame: SessionFit, hypothesis: Hypothesis, values: Iterable[float]
 ) -> list[Hypothesis | None]:
     """Return one hypothesis per value of the smooth setting; None where less of it shows.
 
@@ -226,32 +223,32 @@ def _reshape_all(
     assert hypothesis.effect is not None
     assert hypothesis.smooth is not None
     kind, name = type(hypothesis.effect), hypothesis.smooth
-    shapes, hold = [kind(**{name: float(f"{v:.6g}")}) for v in values], examined.frame.hold
+    shapes, hold = [kind(**{name: float(f"{v:.6g}")}) for v in values], frame.hold
     return [
         h if h is not None and h.dim == hypothesis.dim and shape.possible(hold) else None
-        for h, shape in zip(examined.frame.hypotheses(shapes), shapes, strict=True)
+        for h, shape in zip(frame.hypotheses(shapes), shapes, strict=True)
     ]
 
 
-def _complete(examined: ExaminedFit, shapes: EffectShapes) -> EffectShapes:
+def _complete(frame: SessionFit, shapes: Hypotheses) -> Hypotheses:
     """Add the shapes next to the best one that were passed over, until none is left."""
-    z, hold = examined.frame.residuals.z, examined.frame.hold
+    z, hold = frame.residuals.z, frame.hold
     while True:
         best = int(np.argmax(shapes.parts(z)))
         effect = shapes[best].effect
         assert effect is not None
-        fine = list(shapes)
+        fine = [*shapes.hypotheses]
         for near in (best + 1, best - 1):
             if 0 <= near < len(shapes):
                 other = shapes[near].effect
                 assert other is not None
                 between = effect.between(other, hold)
-                tried = examined.frame.hypotheses(between) if between else []
+                tried = frame.hypotheses(between) if between else []
                 fitting = [h for h in tried if h is not None and h.dim == shapes[best].dim]
                 fine[max(best, near) : max(best, near)] = fitting
         if len(fine) == len(shapes):
             return shapes
-        shapes = EffectShapes.of(fine)
+        shapes = Hypotheses.of(fine)
 
 
 def unknown_beside(

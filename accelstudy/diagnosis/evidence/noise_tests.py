@@ -15,9 +15,9 @@ from scipy import special
 
 from accelstudy.adjustment.quality import global_test
 from accelstudy.diagnosis.evidence.detection import Chance
-from accelstudy.diagnosis.evidence.noise_models import quadratic_forms
+from accelstudy.diagnosis.evidence.noise_models import colour_kernels
 from accelstudy.diagnosis.space.hypotheses import clusters
-from accelstudy.diagnosis.space.residuals import Residuals, position_products
+from accelstudy.diagnosis.space.residuals import Residuals
 
 Array = NDArray[np.float64]
 
@@ -58,7 +58,9 @@ class NoiseTest:
 
 def force_residuals(residuals: Residuals, errors: Array) -> Array:
     """Residuals of the forces in units of sigma, up to sign, (..., n, 3), of errors (..., m)."""
-    return np.stack(position_products(errors, residuals.force_noise), axis=-1)
+    n, c = residuals.whitening.shape[:2]
+    blocks = errors[..., : n * c].reshape(*errors.shape[:-1], n, c)
+    return np.asarray(np.einsum("...nc,nca->...na", blocks, residuals.force_noise))
 
 
 def level_test(residuals: Residuals, sigma_dof: float = np.inf) -> NoiseTest:
@@ -104,10 +106,12 @@ def axis_factors(residuals: Residuals) -> Array:
 
 def colour_test(residuals: Residuals, chance: Chance) -> NoiseTest:
     """Whether the residuals of holds close in time are alike."""
+    kernels = colour_kernels(len(residuals.whitening))
 
     def statistics(errors: Array) -> Array:
-        total = np.sum(errors**2, axis=-1)
-        return quadratic_forms(force_residuals(residuals, errors)) / total[..., None]
+        v, total = force_residuals(residuals, errors), np.sum(errors**2, axis=-1)
+        forms = [np.sum(v * (kernel @ v), axis=(-2, -1)) for kernel in kernels]
+        return np.stack(forms, axis=-1) / total[..., None]
 
     v = force_residuals(residuals, residuals.z)
     successive = float(np.sum(v[1:] * v[:-1]) / np.sum(v**2))
@@ -123,7 +127,7 @@ def _largest(
     sided: Callable[[Array], Array],
 ) -> tuple[float, float]:
     """Largest of some statistics, each over its usual scatter about its mean, and its p-value."""
-    usual, seen = chance.statistic(residuals, statistics), statistics(residuals.z)
+    usual, seen = statistics(chance.errors(residuals)), statistics(residuals.z)
     mean, scale = usual.mean(axis=0), usual.std(axis=0)
     value = float(np.max(sided(seen - mean) / scale))
     return value, _upper(np.max(sided(usual - mean) / scale, axis=-1), value)
@@ -139,7 +143,7 @@ def tail_test(residuals: Residuals, chance: Chance) -> NoiseTest:
         return np.asarray(np.mean(squares**2, axis=-1) / np.mean(squares, axis=-1) ** 2)
 
     value = float(kurtosis(residuals.z))
-    p = _upper(chance.statistic(residuals, kurtosis), value)
+    p = _upper(kurtosis(chance.errors(residuals)), value)
     return NoiseTest(TAILS, value, p, (value,), f"kurtosis of the residuals {value:.1f}")
 
 

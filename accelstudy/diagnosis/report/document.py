@@ -60,7 +60,7 @@ def diagnosis_document(diagnosis: CampaignDiagnosis) -> dict[str, Any]:
         },
         "screening": {
             "p_value": screening.p_value,
-            "simulations": d.case.chance.simulations,
+            "simulations": d.problem.chance.simulations,
             "candidates": [
                 {"name": name, "p_family": p}
                 for name, p in sorted(screening.p_family.items(), key=lambda item: item[1])
@@ -75,7 +75,7 @@ def diagnosis_document(diagnosis: CampaignDiagnosis) -> dict[str, Any]:
         "like": d.like,
         "gap": _gap(d),
         "invisible_effects": d.invisible,
-        "untestable_effects": d.problem.examined.untestable,
+        "untestable_effects": d.frame.tested.untestable,
         "upper_limits": d.upper_limits,
         "next_positions": [
             {

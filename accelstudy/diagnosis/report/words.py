@@ -69,9 +69,9 @@ def warnings(diagnosis: CampaignDiagnosis, axes: Sequence[float]) -> list[str]:
     return render("warnings", diagnosis, axes)
 
 
-def clauses(of: Reason | None) -> list[str]:
-    """Clauses of a reason; none where there is none."""
-    return [] if of is None else render("reason", of)
+def clauses(of: Reason) -> list[str]:
+    """Clauses of a reason; none where it is empty."""
+    return render("reason", of)
 
 
 def sentence(text: str) -> str:

@@ -1,30 +1,53 @@
 """One calibrated session, in which effects are evaluated by their one definition.
 
 The signature of an effect is what it would leave in the observations; what the model leaves of that
-in the residuals is a hypothesis.
+in the residuals is a hypothesis. All effects that the model does not have are candidates.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from accelstudy.adjustment.quality import Solution
+from accelstudy.basics.errors import InputError
 from accelstudy.diagnosis.rules import RULES
-from accelstudy.diagnosis.space.hypotheses import Hypothesis
+from accelstudy.diagnosis.space.hypotheses import (
+    OUTLIER,
+    Hypotheses,
+    Hypothesis,
+    outlying_positions,
+    same_space,
+)
 from accelstudy.diagnosis.space.residuals import Residuals, Signature, ideal_residuals, spans
-from accelstudy.effects import Effect, HoldConditions
+from accelstudy.effects import Effect, HoldConditions, effect_names, get_effect
 from accelstudy.leveling.angles import angles_of
+from accelstudy.sensors.models import compose
 
 Array = NDArray[np.float64]
 
 ROUNDING = 1e-9
 """Share of a signature that rounding errors may leave where nothing is left."""
+
+
+class Candidates(NamedTuple):
+    """What a session can show of all that its model may lack.
+
+    Attributes
+    ----------
+    shapes : dict of name to shapes, what may be missing
+    invisible : tuple of str, effects of rank 0
+    untestable : dict of effect to the reason why it cannot be tested
+    """
+
+    shapes: Mapping[str, Hypotheses]
+    invisible: tuple[str, ...]
+    untestable: Mapping[str, str]
 
 
 @dataclass(frozen=True)
@@ -142,6 +165,103 @@ class SessionFit:
             None if one is None else replace(one, estimates=_estimates(one, columns[i]))
             for i, one in enumerate(found)
         ]
+
+    # --- all that the model may lack --------------------------------------------------------
+
+    @cached_property
+    def tested(self) -> Candidates:
+        """The effects that are not in the model, and bumped positions."""
+        modelled = {effect.name for effect in self.solution.model.effects}
+        by_sensor, redundancy = self.solution.observed.angle_errors, self.residuals.redundancy
+        shapes, invisible, untestable = dict[str, Hypotheses](), [], {}
+        for name in effect_names():
+            if name in modelled:
+                continue
+            if by_sensor is not None and _of_robot(get_effect(name)):
+                untestable[name] = "a calibrated sensor told the angles, and no robot"
+                continue
+            try:
+                tried = get_effect(name).candidates(self.hold, self.forces, self.solution.gravity)
+                seen = [one for one in self.hypotheses(tried) if one is not None]
+            except InputError as error:
+                untestable[name] = str(error)
+                continue
+            fitting = [one for one in seen if one.dim < redundancy]
+            if fitting:
+                shapes[name] = Hypotheses.of(fitting)
+            elif seen:
+                untestable[name] = (
+                    f"its {seen[0].dim} parameters need more than the {redundancy} redundant "
+                    "conditions there are"
+                )
+            else:
+                invisible.append(name)
+        if bumped := outlying_positions(self.residuals):
+            shapes[OUTLIER] = Hypotheses.of(bumped)
+        return Candidates(shapes, tuple(invisible), untestable)
+
+    @property
+    def candidates(self) -> Mapping[str, Hypotheses]:
+        """Shapes of what may be missing."""
+        return self.tested.shapes
+
+    def indistinguishable(self, others: Sequence[Hypothesis]) -> set[str]:
+        """Effects indistinguishable from any of the given hypotheses, in one of their shapes."""
+        ideals, ends = self._ideals
+        same: set[str] = set()
+        for other in others:
+            # The squared cosines sum to the squares of all products: most need no decomposition.
+            squares = np.sum((other.ideal.T @ ideals) ** 2, axis=0)
+            near = np.add.reduceat(squares, ends[:-1]) > other.dim * RULES.alike**2
+            shapes = (self._shapes[k] for k in np.flatnonzero(near))
+            same |= {one.name for one in shapes if one.name not in same and same_space(other, one)}
+        return same
+
+    def nearest(self, hypothesis: Hypothesis) -> tuple[tuple[str, float], ...]:
+        """Other effects and their largest canonical cosines, nearest first."""
+        near: dict[str, float] = {}
+        for shape, cosine in zip(self._shapes, self._cosines(hypothesis, 1).tolist(), strict=True):
+            if shape.name != hypothesis.name:
+                near[shape.name] = max(near.get(shape.name, 0.0), cosine)
+        return tuple(sorted(near.items(), key=lambda item: -item[1]))
+
+    def imitators(self, hypothesis: Hypothesis) -> tuple[str, ...]:
+        """Other effects that could leave all that a hypothesis does, and perhaps more."""
+        smallest = self._cosines(hypothesis, hypothesis.dim)
+        names = {self._shapes[k].name for k in np.flatnonzero(smallest >= RULES.imitates)}
+        return tuple(sorted(names - {hypothesis.name}))
+
+    def _cosines(self, hypothesis: Hypothesis, rank: int) -> Array:
+        """Canonical cosine of this rank, 1 for the largest, with each shape; 0 if it has fewer."""
+        ideals, ends = self._ideals
+        products, dims = hypothesis.ideal.T @ ideals, np.diff(ends)
+        cosines = np.zeros(len(self._shapes))
+        for d in np.unique(dims[dims >= rank]):
+            alike = np.flatnonzero(dims == d)
+            blocks = products[:, ends[alike][:, None] + np.arange(d)]
+            values = np.linalg.svd(np.swapaxes(blocks, 0, 1), compute_uv=False)[:, rank - 1]
+            cosines[alike] = np.minimum(values, 1.0)
+        return cosines
+
+    @cached_property
+    def _shapes(self) -> list[Hypothesis]:
+        """All shapes of all effects."""
+        each = self.candidates.items()
+        return [one for name, shapes in each if name != OUTLIER for one in shapes.hypotheses]
+
+    @cached_property
+    def _ideals(self) -> tuple[Array, NDArray[np.int_]]:
+        """Bases of their spaces for an ideal sensor, side by side, and where each begins."""
+        bases = [shape.ideal for shape in self._shapes]
+        return np.concatenate(bases, axis=1), np.cumsum([0, *(basis.shape[1] for basis in bases)])
+
+
+def _of_robot(effect: Effect) -> bool:
+    """Whether only a robot has an effect: it is in its readings, or turns with its axes."""
+    if type(effect).reading is not Effect.reading:
+        return True
+    columns = compose(effect.spec, (effect.spec,)).hold_columns
+    return effect.part == "rig" and bool({"roll", "pitch", "yaw"} & {*columns})
 
 
 def _estimates(hypothesis: Hypothesis, columns: Array) -> Array:

@@ -3,14 +3,11 @@
 An effect in one of its shapes, or a bumped position, is a space of residuals, K = Q Qᵀ/l: nothing
 is known of its l parameters. A smooth function of a coordinate has a covariance of its own
 (`accelstudy.diagnosis.space.shapes`). Of unknown size, each adds λ K to that of the noise.
-
-No matrix of all conditions by all conditions is formed, so the effort grows with the number of
-positions.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import TYPE_CHECKING
@@ -20,7 +17,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from accelstudy.adjustment.quality import root_of
 from accelstudy.diagnosis.rules import RULES
-from accelstudy.diagnosis.space.residuals import Residuals, position_products
+from accelstudy.diagnosis.space.residuals import Residuals
 from accelstudy.effects import Effect
 
 if TYPE_CHECKING:
@@ -97,6 +94,7 @@ class Hypothesis:
         return self.effect.settings[self.smooth]
 
 
+@dataclass(frozen=True)
 class Shapes:
     """Alternatives of one thing that may be missing: s covariances λ K of the residuals.
 
@@ -178,40 +176,21 @@ def even(dim: int) -> Array:
     return np.full(dim, 1 / max(dim, 1))
 
 
-class Hypotheses(Spaces):
-    """Spaces that are hypotheses with a name: those of an effect, or all bumped positions."""
-
-    def __len__(self) -> int:
-        return len(self.shares)
-
-    def __getitem__(self, index: int) -> Hypothesis:
-        raise NotImplementedError
-
-    def __iter__(self) -> Iterator[Hypothesis]:
-        return (self[i] for i in range(len(self)))
-
-    def strongest(self, z: Array) -> Hypothesis:
-        """Shape that explains most of residuals z (m,)."""
-        return self[int(np.argmax(self.parts(z)))]
-
-
 @dataclass(frozen=True)
-class EffectShapes(Hypotheses):
-    """Shapes of one effect; even a priori over the logarithm of a smooth setting, else even.
+class Hypotheses(Spaces):
+    """Spaces that are hypotheses with a name: the shapes of an effect, or all bumped positions.
 
     Attributes
     ----------
-    prior, shares, vectors : as in `Shapes`
+    prior : (s,) array, even over the logarithm of a smooth setting, else even
+    shares, vectors : as in `Shapes`
     hypotheses : tuple of Hypothesis, whose bases are columns of the vectors
     """
 
-    prior: Array
-    shares: tuple[Array, ...]
-    vectors: Array
     hypotheses: tuple[Hypothesis, ...]
 
     @classmethod
-    def of(cls, hypotheses: Sequence[Hypothesis]) -> EffectShapes:
+    def of(cls, hypotheses: Sequence[Hypothesis]) -> Hypotheses:
         """Gather shapes."""
         weights, shares = np.ones(len(hypotheses)), tuple(even(h.dim) for h in hypotheses)
         if len(hypotheses) > 1 and hypotheses[0].smooth is not None:
@@ -221,132 +200,61 @@ class EffectShapes(Hypotheses):
         each = zip(hypotheses, shapes.split(vectors), strict=True)
         return replace(shapes, hypotheses=tuple(replace(h, basis=basis) for h, basis in each))
 
+    def __len__(self) -> int:
+        return len(self.hypotheses)
+
     def __getitem__(self, index: int) -> Hypothesis:
         return self.hypotheses[index]
 
+    def strongest(self, z: Array) -> Hypothesis:
+        """Shape that explains most of residuals z (m,)."""
+        return self[int(np.argmax(self.parts(z)))]
 
-@dataclass(frozen=True)
-class BumpedPositions(Hypotheses):
-    """One hypothesis per position: its conditions are shifted by an arbitrary amount.
+
+def outlying_positions(residuals: Residuals) -> list[Hypothesis]:
+    """One hypothesis per position that others control: its conditions are shifted at will.
 
     Its space is spanned by R E_i H_i, with E_i the columns of the unit matrix that belong to the
-    position and H_i H_iᵀ = R_ii⁺. The part of z in it is H_iᵀ z_i.
-
-    Attributes
-    ----------
-    prior, shares : as in `Shapes`
-    residuals : Residuals
-    places : (s,) int array, the positions that others control
-    root : (s, c, c) array, H of these; columns of zeros for what is not controlled
+    position and H_i H_iᵀ = R_ii⁺.
     """
-
-    prior: Array
-    shares: tuple[Array, ...]
-    residuals: Residuals
-    places: NDArray[np.int_]
-    root: Array
-
-    @classmethod
-    def of(cls, residuals: Residuals) -> BumpedPositions:
-        """All positions that the others control."""
-        root, rank = root_of(residuals.blocks)
-        places = np.flatnonzero((rank > 0) & (rank < residuals.redundancy))
-        prior = np.ones(len(places)) / max(len(places), 1)
-        shares = tuple(even(dim) for dim in rank[places].tolist())
-        return cls(prior, shares, residuals, places, root[places])
-
-    def parts(self, errors: Array) -> Array:
-        """Squares of what residuals (..., m) have in each of them, (..., s)."""
-        parts = position_products(errors, self.root, self.places)
-        return np.sum([part**2 for part in parts], axis=0)
-
-    def __getitem__(self, index: int) -> Hypothesis:
-        place = int(self.places[index])
-        where, directions = self.rows_of(int(index))
-        rows = np.zeros((len(self.residuals.design), directions.shape[1]))
-        rows[where] = directions
-        basis = self.residuals.project(rows)
-        return Hypothesis(OUTLIER, None, directions, basis, basis, place)
-
-    def combine(self, places: NDArray[np.int_], amounts: Array) -> Array:
-        """Sum vectors of some shapes, but without R, (b, m)."""
-        n, c = len(self.residuals.whitening), self.root.shape[-1]
-        each = np.zeros((len(places), c))
-        # The columns of H that are zero are the first ones.
-        each[np.arange(c) >= c - self.dims[places, None]] = amounts
-        sums = np.zeros((len(places), len(self.residuals.design)))
-        blocks = sums[:, : n * c].reshape(-1, n, c)
-        blocks[np.arange(len(places)), self.places[places]] = np.einsum(
-            "bij,bj->bi", self.root[places], each
-        )
-        return sums
-
-    def rows_of(self, index: int) -> tuple[slice, Array]:
-        """Rows of the conditions of one position, and its H there, (c, l); R E H is a basis."""
-        place, root = int(self.places[index]), self.root[index]
-        c = len(root)
-        return slice(place * c, (place + 1) * c), root[:, np.any(root != 0, axis=0)]
+    root, rank = root_of(residuals.blocks)
+    c, found = root.shape[-1], []
+    for place in np.flatnonzero((rank > 0) & (rank < residuals.redundancy)).tolist():
+        shift = root[place][:, np.any(root[place] != 0, axis=0)]
+        rows = np.zeros((len(residuals.design), shift.shape[1]))
+        rows[place * c : (place + 1) * c] = shift
+        basis = residuals.project(rows)
+        found.append(Hypothesis(OUTLIER, None, shift, basis, basis, place))
+    return found
 
 
 # --- positions of one attitude: their differences are noise alone, whatever the model lacks -------
 
 
-@dataclass(frozen=True)
-class LackOfFit(Spaces):
-    """All that positions of one attitude have in common: everything but their differences.
+def space_of_attitudes(residuals: Residuals, labels: NDArray[np.int_]) -> Array:
+    """Orthonormal basis (m, l) of what positions with one label have in common: no differences.
 
     A change of conditions by t that is the same in all positions of an attitude is L_iᵀ t at unit
     weight (but for what varies between them). Of these directions, orthonormal within each
     attitude, those are left that the model does not absorb.
-
-    Attributes
-    ----------
-    order : (n,) int array, positions sorted by attitude
-    starts : (a,) int array, where each attitude begins there
-    weights : (n, c, c) array, W_i with Σ W_i e_i the coordinates (c,) of an attitude, sorted
-    absorbed : (a c + k, l) array, orthonormal basis of what the model absorbs, in coordinates
-    shares : tuple of one array (l,), as in `Shapes`
     """
-
-    order: NDArray[np.int_]
-    starts: NDArray[np.int_]
-    weights: Array
-    absorbed: Array
-    shares: tuple[Array, ...]
-
-    @classmethod
-    def of(cls, residuals: Residuals, labels: NDArray[np.int_]) -> LackOfFit:
-        """Lack of fit of residuals whose positions have labels (n,), equal for equal attitudes."""
-        order = np.argsort(labels, kind="stable")
-        starts = np.flatnonzero(np.diff(labels[order], prepend=-1))
-        whitening = residuals.whitening[order]
-        normal = np.add.reduceat(whitening @ np.swapaxes(whitening, 1, 2), starts, axis=0)
-        inverse = np.linalg.inv(np.linalg.cholesky(normal))
-        counts = np.diff(np.append(starts, len(labels)))
-        weights = np.repeat(inverse, counts, axis=0) @ whitening
-        same = cls(order, starts, weights, np.empty((0, 0)), ())
-        left, values, _ = np.linalg.svd(same._means(residuals.absorbed.T).T, full_matrices=False)
-        absorbed = left[:, values > RULES.absorbed]
-        shares = (even(absorbed.shape[0] - absorbed.shape[1]),)
-        return replace(same, absorbed=absorbed, shares=shares)
-
-    def parts(self, errors: Array) -> Array:
-        """Squares of what residuals (..., m) have in it, (..., 1)."""
-        same = self._means(errors)
-        part = np.sum(same**2, axis=-1) - np.sum((same @ self.absorbed) ** 2, axis=-1)
-        return np.maximum(part, 0.0)[..., None]
-
-    def _means(self, errors: Array) -> Array:
-        """Coordinates of residuals (..., m): of each attitude, and of observed gravity."""
-        n, c = self.weights.shape[:2]
-        blocks = errors[..., : n * c].reshape(*errors.shape[:-1], n, c)[..., self.order, :]
-        weighted = np.einsum("ncd,...nd->...nc", self.weights, blocks)
-        sums = np.add.reduceat(weighted, self.starts, axis=-2)
-        return np.concatenate([sums.reshape(*errors.shape[:-1], -1), errors[..., n * c :]], axis=-1)
+    n, c = residuals.whitening.shape[:2]
+    attitudes, which = np.unique(labels, return_inverse=True)
+    normal = np.zeros((len(attitudes), c, c))
+    np.add.at(normal, which, residuals.whitening @ np.swapaxes(residuals.whitening, 1, 2))
+    weights = np.linalg.inv(np.linalg.cholesky(normal))[which] @ residuals.whitening
+    rest = len(residuals.design) - n * c
+    same = np.zeros((n * c + rest, len(attitudes) * c + rest))
+    for i, k in enumerate(which):
+        same[i * c : (i + 1) * c, k * c : (k + 1) * c] = weights[i].T
+    same[n * c :, len(attitudes) * c :] = np.eye(rest)  # observed gravity is by itself
+    left, values, _ = np.linalg.svd(same.T @ residuals.absorbed)
+    absorbed = np.count_nonzero(values > RULES.absorbed)
+    return np.asarray(same @ left[:, absorbed:])
 
 
-def lack_of_fit(residuals: Residuals, forces: Array) -> LackOfFit | None:
-    """Return what repeated positions have in common; None if no attitude was measured twice.
+def repeats_of(residuals: Residuals, forces: Array) -> Spaces | None:
+    """What repeated positions have in common; None if no attitude was measured twice.
 
     Nor is there any where the model absorbs all of it, or the repeats leave no redundancy.
 
@@ -358,24 +266,19 @@ def lack_of_fit(residuals: Residuals, forces: Array) -> LackOfFit | None:
     labels = clusters(forces)
     if len(np.unique(labels)) == len(forces):
         return None
-    same = LackOfFit.of(residuals, labels)
-    return same if 0 < same.dims[0] < residuals.redundancy else None
+    basis = space_of_attitudes(residuals, labels)
+    dim = basis.shape[1]
+    return Spaces(np.ones(1), (even(dim),), basis) if 0 < dim < residuals.redundancy else None
 
 
-def clusters(forces: NDArray[np.float64]) -> NDArray[np.int_]:
+def clusters(forces: Array) -> NDArray[np.int_]:
     """Label positions by attitude; positions with the same label repeat each other."""
     unit = forces / np.linalg.norm(forces, axis=1, keepdims=True)
     labels = -np.ones(len(unit), dtype=int)
-    # Only positions alike in one coordinate need to be compared.
-    order = np.argsort(unit[:, 0], kind="stable")
-    x = unit[order, 0]
-    first = np.searchsorted(x, unit[:, 0] - RULES.same_attitude)
-    last = np.searchsorted(x, unit[:, 0] + RULES.same_attitude, side="right")
-    for i in range(len(unit)):
+    for i, here in enumerate(unit):
         if labels[i] < 0:
-            near = order[first[i] : last[i]]
-            near = near[labels[near] < 0]
-            labels[near[np.linalg.norm(unit[near] - unit[i], axis=1) < RULES.same_attitude]] = i
+            near = np.linalg.norm(unit - here, axis=1) < RULES.same_attitude
+            labels[near & (labels < 0)] = i
     return labels
 
 

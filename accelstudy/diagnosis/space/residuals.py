@@ -171,34 +171,6 @@ class Residuals:
         return np.asarray(rows - self.absorbed @ (self.absorbed.T @ rows))
 
 
-def position_products(
-    errors: Array, matrices: Array, places: NDArray[np.int_] | None = None
-) -> list[Array]:
-    """Multiply the residuals of each position by the columns of a matrix of its own.
-
-    Parameters
-    ----------
-    errors : (..., m) array
-    matrices : (s, c, k) array
-    places : (s,) int array, the positions; the first s by default
-
-    Returns
-    -------
-    list of k arrays (..., s), one for each column
-    """
-    c = matrices.shape[1]
-    chosen = slice(len(matrices)) if places is None else places
-    # Condition by condition: several times as fast as a sum over a last axis of three.
-    parts = [errors[..., i::c][..., chosen] for i in range(c)]
-    products = []
-    for column in np.moveaxis(matrices, 2, 0):
-        product = parts[0] * column[:, 0]
-        for part, factor in zip(parts[1:], column.T[1:], strict=True):
-            product += part * factor
-        products.append(product)
-    return products
-
-
 def ideal_residuals(solution: Solution) -> tuple[Residuals, Array]:
     """Residual space of an ideal sensor in the same positions, and its forces (n, 3).
 

@@ -60,19 +60,15 @@ class LearnedShapes(Shapes):
 
     Attributes
     ----------
-    places : tuple of Place, s
     prior : (s,) array, even over the coordinates, then over their targets, over the kinds of
         functions that are tried of each, and over their smoothness; the attitude counts as one
         coordinate. Where a column is absent, slow changes with time have more
-    vectors : (m, Σ k) array, eigenvectors of K, one shape beside the other
-    shares : tuple of arrays (k,), eigenvalues of K of each shape, which sum to 1
+    shares, vectors : as in `Shapes`
+    places : tuple of Place, s
     attitude : Spaces or None, everything but the differences of repeated positions, the last place
     """
 
     places: tuple[Place, ...]
-    prior: Array
-    vectors: Array
-    shares: tuple[Array, ...]
     attitude: Spaces | None = None
 
     @classmethod
@@ -130,7 +126,7 @@ class LearnedShapes(Shapes):
             kept = np.flatnonzero(values > MIN_TRACE_SHARE * values.sum())[-MAX_DIRECTIONS:]
             vectors.append(root @ (turned[:, kept] / np.sqrt(values[kept])))
             shares.append(values[kept] / values[kept].sum())
-        return cls(tuple(places), weights, np.concatenate(vectors, axis=1), tuple(shares))
+        return cls(weights, tuple(shares), np.concatenate(vectors, axis=1), tuple(places))
 
     def orthogonal_to(self, basis: Array) -> LearnedShapes:
         """What is left of the shapes beside a space with an orthonormal basis (m, l)."""
@@ -145,10 +141,10 @@ class LearnedShapes(Shapes):
         some = [i for i in range(len(self.shares)) if self.places[i] in places]
         vectors, weights = self.split(self.vectors), self.prior[some]
         return LearnedShapes(
-            tuple(self.places[i] for i in some),
             weights / weights.sum(),
-            np.concatenate([self.vectors[:, :0], *(vectors[i] for i in some)], axis=1),
             tuple(self.shares[i] for i in some),
+            np.concatenate([self.vectors[:, :0], *(vectors[i] for i in some)], axis=1),
+            tuple(self.places[i] for i in some),
         )
 
     def parts(self, errors: Array) -> Array:
@@ -167,18 +163,12 @@ class LearnedShapes(Shapes):
             logs.append(self.attitude.logs(evidence, parts[..., self.ends[-1] :], squares))
         return np.concatenate(logs, axis=-1)
 
-    def place_densities(
-        self, evidence: Evidence, parts: Array, squares: ArrayLike
-    ) -> dict[Place, Array]:
-        """Log density of residuals under the shapes of each place, times its prior, (...)."""
-        logs = self.logs(evidence, parts, squares) + np.log(self.prior)
+    def place_densities(self, evidence: Evidence, errors: Array) -> dict[Place, Array]:
+        """Log density of residuals (..., m) under the shapes of each place, times its prior."""
+        squares = np.sum(errors**2, axis=-1)
+        logs = self.logs(evidence, self.parts(errors), squares) + np.log(self.prior)
         of_place = {p: [q == p for q in self.places] for p in dict.fromkeys(self.places)}
         return {place: log_sum(logs[..., some]) for place, some in of_place.items()}
-
-    def place_densities_of(self, evidence: Evidence, z: Array) -> dict[Place, float]:
-        """Log density of residuals z (m,) under the shapes of each place, times its prior."""
-        each = self.place_densities(evidence, self.parts(z), z @ z)
-        return {place: float(log) for place, log in each.items()}
 
 
 # --- coordinates --------------------------------------------------------------------------------
