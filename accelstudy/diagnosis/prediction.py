@@ -46,7 +46,6 @@ class HeldOutGap:
     floor : float, what it would be with the right model
     z : float
     held : tuple of int, indices of the held-out positions
-    misses : (tuple, tuple) of float, m/s², rms misclosure of each of them by either model
     needed : float, z beyond which the correction is right at 5 %, given that it has a name
     short : float, by how much less than expected the residuals agree with the correction, negative,
         over its sigma: about standard normal if the extended model is right
@@ -57,7 +56,6 @@ class HeldOutGap:
     floor: float
     z: float
     held: tuple[int, ...]
-    misses: tuple[tuple[float, ...], tuple[float, ...]]
     needed: float = RULES.z_significant
     short: float = 0.0
 
@@ -148,7 +146,6 @@ def held_out_gap(
         floor=float(1 + spread / len(d)),
         z=float(d @ first.white / np.sqrt(size * variance)) if size > 0 else 0.0,
         held=tuple(int(i) for i in held),
-        misses=(first.misses, second.misses),
         short=float(missed / np.sqrt(noise)) if noise > 0 else 0.0,
     )
 
@@ -160,28 +157,17 @@ def relative_variance(one: Solution, other: Solution) -> float:
 
 
 class _Prediction(NamedTuple):
-    """What a fit leaves in unused positions.
-
-    Attributes
-    ----------
-    white : (m,) array, misclosures of unit weight
-    slope : (m, u) array, their derivatives by the parameters
-    misses : tuple of float, m/s², rms misclosure of each position
-    """
+    """Misclosures of unit weight in unused positions, (m,), and their derivatives, (m, u)."""
 
     white: Array
     slope: Array
-    misses: tuple[float, ...]
 
 
 def _predict(fit: Solution, observed: Observations) -> _Prediction:
     """Predict positions by a fit to others."""
     at = Residuals.at(fit.model, fit.approach, observed, fit.parameters)
-    n, c = at.whitening.shape[:2]
-    white = at.errors[: n * c]
-    missed = (at.whitening @ white.reshape(n, c, 1))[..., 0]
-    misses = np.sqrt(np.mean(missed**2, axis=1)).tolist()
-    return _Prediction(white, at.design[: n * c], tuple(misses))
+    rows = at.whitening.shape[0] * at.whitening.shape[1]
+    return _Prediction(at.errors[:rows], at.design[:rows])
 
 
 @dataclass(frozen=True)

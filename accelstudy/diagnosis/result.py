@@ -367,7 +367,7 @@ class CampaignDiagnosis:
     def shape(self) -> LearnedShape | None:
         """The function that was learned."""
         learned = self.verdict == LEARNED
-        return shape_of(self.problem, self.finding, self.noise.variance) if learned else None
+        return shape_of(self.finding, self.noise.variance) if learned else None
 
     @cached_property
     def like(self) -> tuple[LikeShape, ...]:

@@ -1,31 +1,111 @@
-"""A learned function as people see it: its table, the residuals upon it, and what it may be."""
+"""A learned function as people see it: what depends on what, its table, the residuals upon it."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from accelstudy.basics.wording import comma_list
-from accelstudy.diagnosis.coordinates import TARGETS, coordinate_of
-from accelstudy.diagnosis.decision.functions import coordinate_values, space_of
-from accelstudy.diagnosis.decision.problem import Problem
+from accelstudy.basics.units import attitude_unit, to_attitude
+from accelstudy.basics.wording import comma_list, number
+from accelstudy.diagnosis.decision.functions import coordinate_values
 from accelstudy.diagnosis.decision.verdict import Finding
-from accelstudy.diagnosis.formulas import Formula, rank_formulas
 from accelstudy.diagnosis.rules import RULES
 from accelstudy.diagnosis.space.frame import SessionFit
 from accelstudy.diagnosis.space.shapes import function_rows
-from accelstudy.effects.learned import OF_EACH, Learned
+from accelstudy.effects import learned
+from accelstudy.effects.learned import OF_EACH, WAVES, Learned
 
 Array = NDArray[np.float64]
 
 POINTS = 121
 """Values of the coordinate in the table of a function."""
-MAX_PLACES, MIN_PLACE_DISTANCE = 3, 0.15
-"""Places where a function is known least, and how far apart they are, in parts of the range."""
-MIN_SIGMA_SHARE = 0.8
-"""Part of the largest sigma from which on a function is known least."""
+
+
+# --- coordinates, and what may depend on them ---------------------------------------------------
+
+
+class Coordinate(NamedTuple):
+    """How people see a coordinate.
+
+    Attributes
+    ----------
+    words : str
+    place : str, the same where no axis is meant
+    unit : str, of its values
+    size : float, SI size of that unit
+    """
+
+    words: str
+    place: str
+    unit: str
+    size: float = 1.0
+
+    def at(self, value: float) -> str:
+        """Show a value."""
+        return f"{number(value / self.size)} {self.unit}".rstrip()
+
+
+def coordinate_of(name: str) -> Coordinate:
+    """Describe a coordinate of a learned effect, or of a place."""
+    words, place, unit, size = COORDINATES[WAVES.get(name, name)]
+    if unit == "rad":
+        unit, size = attitude_unit(), float(1 / to_attitude(1.0))
+    return Coordinate(words, place or words, unit, size)
+
+
+RATE = "the rate of the temperature", "", "K/min", 1 / 60
+COORDINATES = {
+    "angle": ("the angle", "roll and pitch", "rad", 1.0),
+    "yaw": ("the yaw", "", "rad", 1.0),
+    "move": ("the last move of the robot", "", "rad", 1.0),
+    "force": ("the force along the same axis", "the force", "m/s²", 1.0),
+    "previous": ("the force in the position before", "", "m/s²", 1.0),
+    "next": ("the step to the next position", "", "m/s²", 1.0),
+    "vibration": ("the vibration", "vibration", "m/s²", 1.0),
+    "temperature": ("the temperature", "temperature", "°C", 1.0),
+    "temperature rate": RATE,
+    "dT/dt": RATE,
+    "time": ("the time", "time", "min", 60.0),
+    "order": ("the number of the position", "", "", 1.0),
+}
+"""Words of each coordinate, also where no axis is meant if these are others, and its unit."""
+
+
+class Target(NamedTuple):
+    """What depends on a coordinate.
+
+    Attributes
+    ----------
+    label, words : str, short and in a sentence, with a place for the components
+    alone : str, in a sentence, without them
+    components : tuple of str
+    unit : str, SI
+    """
+
+    label: str
+    words: str
+    alone: str
+    components: tuple[str, ...]
+    unit: str
+
+
+WORDS = {
+    "bias": ("bias of {}", "the bias of {}", "a bias"),
+    "scale": ("scale of {}", "the scale of {}", "a scale"),
+    "square": ("quadratic scale of {}", "the quadratic scale of {}", "a scale"),
+    "nonorthogonality": ("non-orthogonality {}", "the non-orthogonality {}", "a non-orthogonality"),
+    "mounting": ("rotation about {}", "the rotation of the sensor on its mounting about {}",
+                 "a rotation of the sensor on its mounting"),
+    "reading": ("reading of {}", "the robot's reading of {}", "an error of the robot's readings"),
+    "tilt": ("tilt {}", "the tilt of the robot's base ({})", "a tilt of the base"),
+}  # fmt: skip
+TARGETS = {name: Target(*said, *learned.TARGETS[name]) for name, said in WORDS.items()}
+
+
+# --- the function -------------------------------------------------------------------------------
 
 
 @dataclass(frozen=True)
@@ -37,7 +117,6 @@ class LearnedShape:
     coordinate, target : str
     effect : Learned
     subject : str, what depends on what: "the bias of x and y depends on the yaw"
-    formulas : tuple of Formula, which it may be, most probable first
     components : tuple of str, c components that have a function
     axes : tuple of str, those in which it shows
     grid : (k,) array, the coordinate, SI
@@ -45,14 +124,12 @@ class LearnedShape:
     where : (n, c) array, the coordinate of each component in the positions, SI
     residuals, spreads : (n, c) arrays, h and what the final fit leaves of it in each position, as
         far as the position shows it, and the noise of that, SI; NaN where it does not act
-    least_known : tuple of float, values of the coordinate where positions would show most of it
     """
 
     coordinate: str
     target: str
     effect: Learned
     subject: str
-    formulas: tuple[Formula, ...]
     components: tuple[str, ...]
     axes: tuple[str, ...]
     grid: Array
@@ -61,7 +138,6 @@ class LearnedShape:
     where: Array
     residuals: Array
     spreads: Array
-    least_known: tuple[float, ...]
 
     @property
     def extents(self) -> dict[str, float]:
@@ -70,19 +146,17 @@ class LearnedShape:
         return {name: extent for name, extent in extents if name in self.axes}
 
 
-def shape_of(problem: Problem, finding: Finding, variance: float) -> LearnedShape | None:
+def shape_of(finding: Finding, variance: float) -> LearnedShape | None:
     """Describe the function that was learned; None if none was.
 
     Parameters
     ----------
-    problem : Problem
     finding : Finding, whose first choice is the function
     variance : float, of unit weight
     """
     if finding.place is None:
         return None
-    learned, *others = (cause.shape for cause in finding.chosen)
-    effect, frame, solution = learned.effect, finding.frame, finding.frame.solution
+    effect, frame, solution = finding.chosen[0].shape.effect, finding.frame, finding.frame.solution
     assert isinstance(effect, Learned)
     at = coordinate_values(effect, frame)
     if effect.coordinate not in (*OF_EACH, "angle"):
@@ -103,12 +177,10 @@ def shape_of(problem: Problem, finding: Finding, variance: float) -> LearnedShap
     shown = most >= min(RULES.z_component, most.max())
     axes = tuple(name for name, seen in zip(target.components, shown, strict=True) if seen)
     which = "all axes" if len(axes) == len("xyz") else comma_list(axes)
-    beside = space_of(others, len(problem.residuals.z))
     return LearnedShape(
         *finding.place,
         effect,
         f"{target.words.format(which)} depends on {coordinate_of(effect.coordinate).words}",
-        rank_formulas(problem.frame, problem.evidence, effect, finding.place, at, beside),
         target.components,
         axes,
         grid,
@@ -117,7 +189,6 @@ def shape_of(problem: Problem, finding: Finding, variance: float) -> LearnedShap
         np.broadcast_to(at, left.shape),
         np.where(np.isnan(spreads), np.nan, np.stack(here, axis=1) + left),
         spreads,
-        _least_known(grid, np.sqrt(np.mean(sigmas[:, shown] ** 2, axis=1))),
     )
 
 
@@ -129,15 +200,3 @@ def _residual_function(frame: SessionFit, effect: Learned, variance: float) -> t
     errors = frame.residuals.errors[: n * conditions].reshape(n, conditions, 1)
     square = np.maximum(np.sum(seen**2, axis=1), np.finfo(float).tiny)
     return np.sum(seen * errors, axis=1) / square, np.sqrt(variance / square)
-
-
-def _least_known(grid: Array, sigma: Array) -> tuple[float, ...]:
-    """Places where a function is known least, in order."""
-    places: list[float] = []
-    far = MIN_PLACE_DISTANCE * (grid[-1] - grid[0])
-    for i in np.argsort(-sigma, kind="stable"):
-        if len(places) == MAX_PLACES or sigma[i] < MIN_SIGMA_SHARE * sigma.max():
-            break
-        if all(abs(grid[i] - other) > far for other in places):
-            places.append(float(grid[i]))
-    return tuple(sorted(places))

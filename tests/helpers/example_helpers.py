@@ -17,7 +17,7 @@ SHOWN = ROOT / "docs" / "tutorials" / "shown"
 FIGURES = {
     "paper": ["paper.png"],
     "log": ["box.png", "box/segmentation.png", "calibrated/figures/residuals.png"],
-    "hidden": ["diagnosed/figures/gap.png", "diagnosed/figures/evidence.png"],
+    "hidden": ["diagnosed/figures/evidence.png"],
     "lot": ["lot/figures/sensors.png"],
     "pole": ["pole.png"],
 }

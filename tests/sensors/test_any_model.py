@@ -17,10 +17,9 @@ from accelstudy.campaign.calibration.fit import fit_campaign
 from accelstudy.campaign.calibration.leveling import level
 from accelstudy.campaign.calibration.sensor_calibration import read_calibration
 from accelstudy.diagnosis.pipeline import diagnose
-from accelstudy.diagnosis.report.document import diagnosed_calibration, study_overlay
+from accelstudy.diagnosis.report.document import diagnosed_calibration, model_file
 from accelstudy.sensors.frames import parse_frame
 from accelstudy.sensors.models import get_model
-from accelstudy.study.config import parse_study
 
 NINE = "bias-scale-nonorthogonality"
 
@@ -224,14 +223,11 @@ def test_the_rig_stays_where_it_was(tmp_path):
     assert len(export(read_calibration(path), "matrix").splitlines()) == 3
 
 
-def test_a_model_that_becomes_a_registered_one_is_a_study_too():
+def test_a_model_that_becomes_a_registered_one_has_a_file_too():
     campaign = acs.simulate_campaign(scheme="fibonacci-30")
     diagnosis = diagnose(campaign, get_model("bias-scale"))
     assert diagnosis.extended_model.name == NINE
-    overlay = study_overlay(diagnosis)
-    assert overlay["models"] == {"extended": ["bias", "scale", "nonorthogonality"]}
-    models = parse_study({**overlay, "seed": 1}).grids[0].models
-    assert [model.name for model in models] == ["bias-scale", "extended"]
+    assert model_file(diagnosis) == {"models": {"extended": ["bias", "scale", "nonorthogonality"]}}
 
 
 def test_a_large_effect_is_fitted_from_the_affine_part_on():

@@ -21,17 +21,14 @@ from accelstudy.campaign.calibration.document import (
     quality_document,
 )
 from accelstudy.campaign.calibration.fit import CampaignFit, campaign_estimability
-from accelstudy.campaign.session import Campaign
 from accelstudy.diagnosis.consequences import TiltErrors
-from accelstudy.diagnosis.coordinates import TARGETS
 from accelstudy.diagnosis.decision.statement import Part
 from accelstudy.diagnosis.report.words import clauses, warnings
 from accelstudy.diagnosis.result import CampaignDiagnosis, NamedCause
 from accelstudy.diagnosis.rules import RULES
-from accelstudy.diagnosis.shape import LearnedShape
+from accelstudy.diagnosis.shape import TARGETS, LearnedShape
 from accelstudy.sensors.frames import FRD
 from accelstudy.sensors.models import MODELS, composition_name
-from accelstudy.sensors.sensor import SensorModel
 
 
 def diagnosis_document(diagnosis: CampaignDiagnosis) -> dict[str, Any]:
@@ -114,8 +111,6 @@ def shape_document(shape: LearnedShape) -> dict[str, Any]:
             "value": dict(zip(names, shape.values.T.tolist(), strict=True)),
             "sigma": dict(zip(names, shape.sigmas.T.tolist(), strict=True)),
         },
-        "formulas": shape.formulas,
-        "least_known": shape.least_known,
     }
 
 
@@ -227,8 +222,6 @@ def positions_table(diagnosis: CampaignDiagnosis) -> pd.DataFrame:
     residual_*_before_mps2, residual_*_after_mps2 : what the readings lack of the conditions, by the
         base fit and by the final one: the output less that in the robot's attitude, or the norm
         of f_b less gravity
-    predicted_before_mps2, predicted_after_mps2 : of held-out positions, rms of the residuals by
-        the fits to the other positions, without and with the effects that were found
     """
     d, campaign, held = diagnosis, diagnosis.campaign, diagnosis.gap.held_out
     n, kept = campaign.n_positions, np.flatnonzero(diagnosis.used_positions)
@@ -250,9 +243,6 @@ def positions_table(diagnosis: CampaignDiagnosis) -> pd.DataFrame:
         names = ("norm",) if fitted.misclosures.shape[1] == 1 else ("x", "y", "z")
         for name, values in zip(names, fitted.misclosures.T, strict=True):
             table[f"residual_{name}_{when}_mps2"] = pd.Series(values, rows)
-    for k, when in enumerate(("before", "after")):
-        missed = {} if held is None else dict(zip(held.held, held.misses[k], strict=True))
-        table[f"predicted_{when}_mps2"] = pd.Series(missed, dtype=float)
     return table
 
 
@@ -262,93 +252,11 @@ def condition_sigma(solution: Solution, variance: float) -> float:
     return float(np.sqrt(variance * np.mean(np.einsum("ncc->nc", covariance))))
 
 
-REPLICATES = 1000
-
-
-def study_overlay(diagnosis: CampaignDiagnosis) -> dict[str, Any]:
-    """Return a configuration that overlays `config/config.yaml`.
-
-    The simulated sensor has the effects that were found, with the estimates as true values, and the
-    noise that was found. It is calibrated with the base model and with the extended one, in as many
-    evenly spread positions as the campaign has.
-    """
-    d = diagnosis
-    solution = d.final.solution
-    extended = d.extended_model
-    effects = [effect.spec for effect in extended.effects]
-    models = [composition_name(d.model.effects)]
-    composed: dict[str, list[str]] = {}
-    if extended is not d.model:
-        # The one model of the file's own is the one that the file stands for.
-        added = [e.name for e in extended.effects[len(d.model.effects) :]]
-        name = "-".join([study_name(models[0]), *added])
-        composed = {
-            "extended" if name in MODELS or len(name) > MAX_NAME_BYTES else name: list(effects)
-        }
-    noise: dict[str, Any] = {
-        "sensor": {"sigma_mps2": d.sigma_position, "per": "position"},
-        "gravity": {"sigma_mps2": d.campaign.sigma_gravity, "error_mps2": 0.0},
-    }
-    if d.campaign.sigma_angle is not None:
-        noise["robot"] = {"sigma_mgon": d.campaign.sigma_angle / MGON}
-    content = {
-        **plugins.file_key(),
-        "study": study_name(d.campaign.name),
-        "gravity_mps2": solution.gravity,
-        "noise": noise,
-        "simulated_effects": effects,
-        "sensor": _truth(extended, solution.parameters.tolist()),
-        "models": composed,
-        "grids": [
-            {
-                "models": [*models, *composed],
-                "schemes": [f"fibonacci-{d.campaign.n_positions}"],
-                "approaches": [d.approach.name],
-                "replicates": REPLICATES,
-            }
-        ],
-        "presets": None,
-        "sensitivity": None,
-        "paper": False,
-    }
-    holds = study_holds(d.campaign, extended)
-    return {**content, "holds": holds} if holds else content
-
-
-def study_holds(campaign: Campaign, model: SensorModel) -> dict[str, Any]:
-    """Conditions of the holds on which the effects of a model depend, in the ranges of a campaign.
-
-    A course of the temperature that correlates with the order of the holds is taken as linear, any
-    other as random.
-    """
-    needed, holds = model.hold_columns, dict[str, Any]()
-    if {"time", "order"} & {*needed} and campaign.time is not None:
-        holds["interval_s"] = float(np.ptp(campaign.time) / (campaign.n_positions - 1))
-    if "temperature" in needed and campaign.temperature is not None:
-        t = campaign.temperature
-        trend = np.corrcoef(np.arange(len(t)), t)[0, 1] if np.ptp(t) > 0 else 0.0
-        low, high = float(t.min()), float(t.max())
-        holds["temperature_degC"] = [high, low] if trend < -0.5 else [low, high]
-        holds["temperature_order"] = "linear" if abs(trend) > 0.5 else "random"
-    if "vibration" in needed and campaign.vibration is not None:
-        holds["vibration_mps2"] = [float(campaign.vibration.min()), float(campaign.vibration.max())]
-    if "yaw" in needed and campaign.yaw is not None:
-        holds["yaw"] = "random" if np.ptp(campaign.yaw) > 0 else "none"
-    return holds
-
-
-def study_name(name: str) -> str:
-    """Return the name of a campaign as the name of a study: letters, digits, _ and - only."""
-    return re.sub(r"[^A-Za-z0-9_-]+", "-", name)[:MAX_NAME_BYTES].strip("-_") or "campaign"
-
-
-def _truth(model: SensorModel, parameters: list[float]) -> dict[str, dict[str, Any]]:
-    """Estimates as true values, by effect, SI."""
-    values = dict(zip(model.parameter_names, parameters, strict=False))  # gravity may follow
-    return {
-        effect.spec: {
-            "value": [values[p.name] for p in effect.parameters],
-            "unit": effect.parameters[0].unit,
-        }
-        for effect in model.effects
-    }
+def model_file(diagnosis: CampaignDiagnosis) -> dict[str, Any]:
+    """Return the content of model.yaml: the extended model, for wherever a model is asked for."""
+    base, extended = diagnosis.model, diagnosis.extended_model
+    added = [effect.name for effect in extended.effects[len(base.effects) :]]
+    name = "-".join([re.sub(r"[^A-Za-z0-9_-]+", "-", composition_name(base.effects)), *added])
+    if name in MODELS or len(name) > MAX_NAME_BYTES:
+        name = "extended"
+    return {**plugins.file_key(), "models": {name: [effect.spec for effect in extended.effects]}}

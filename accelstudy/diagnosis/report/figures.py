@@ -13,15 +13,13 @@ from matplotlib.ticker import MaxNLocator, NullLocator
 from numpy.typing import NDArray
 
 from accelstudy.basics.units import shown_unit, to_display
-from accelstudy.basics.wording import number, words
-from accelstudy.diagnosis.coordinates import TARGETS, coordinate_of
+from accelstudy.basics.wording import words
 from accelstudy.diagnosis.decision.posterior import Explanation
 from accelstudy.diagnosis.evidence.candidates import UNKNOWN
 from accelstudy.diagnosis.report.document import condition_sigma
-from accelstudy.diagnosis.report.words import place_text
-from accelstudy.diagnosis.result import CampaignDiagnosis, LikeShape
+from accelstudy.diagnosis.result import CampaignDiagnosis
 from accelstudy.diagnosis.rules import RULES
-from accelstudy.diagnosis.shape import LearnedShape
+from accelstudy.diagnosis.shape import TARGETS, LearnedShape, coordinate_of
 from accelstudy.diagnosis.space.shapes import coordinate_in_holds
 from accelstudy.drawing.style import (
     ANGLE_COLOURS,
@@ -51,10 +49,6 @@ def diagnosis_figures(
         figures["evidence"] = lambda: evidence_figure(d)
     if (shape := d.shape) is not None:
         figures["shape"] = lambda: shape_figure(shape)
-    if d.gap.held_out is not None:
-        figures["gap"] = lambda: gap_figure(d, positions)
-    if d.like:
-        figures["location"] = lambda: location_figure(d.like)
     return figures
 
 
@@ -121,7 +115,7 @@ def _panels(diagnosis: CampaignDiagnosis, positions: pd.DataFrame, count: int) -
     if shown in ("force", "time", "temperature"):
         return panels
     of, values = coordinate_of(shown), coordinate_in_holds(coordinate, diagnosis.frame)
-    words, values = _axis(place_text(shown)), values / of.size
+    words, values = _axis(of.place), values / of.size
     if values.shape[1] == count:
         return panels | {_per_unit(words, of.unit): _abreast(values)}
     parts = {1: [words], 2: ["roll", "pitch"], 3: [f"{words}, {axis}" for axis in "xyz"]}
@@ -214,24 +208,6 @@ def _percent(probability: float | None) -> str:
     return "> 99 %" if probability > 0.99 else f"{100 * probability:.0f} %"
 
 
-MAX_PLACES = 5
-"""Places that are drawn by themselves; the others count together."""
-
-
-def location_figure(like: Sequence[LikeShape]) -> Figure:
-    """Posterior of the places where what is missing may live."""
-    bars = {f"{o.target} over {_axis(place_text(o.coordinate))}": o.posterior
-            for o in like[:MAX_PLACES]}  # fmt: skip
-    if len(like) > MAX_PLACES:
-        bars["all others"] = sum(one.posterior for one in like[MAX_PLACES:])
-    figure = new_figure(FULL, 18 + 6 * len(bars))
-    ax = figure.add_subplot()
-    draw_shares(ax, bars, AFTER)
-    ax.set(xlim=(0, 110), xlabel="posterior probability / %")
-    ax.invert_yaxis()
-    return figure
-
-
 def draw_explanations(ax: Axes, explanations: tuple[Explanation, ...]) -> None:
     """Draw the posterior of each explanation; nothing is missing if there are none."""
     if not explanations:
@@ -287,43 +263,3 @@ def _axis(words: str) -> str:
 def _per_unit(what: str, unit: str) -> str:
     """Label an axis: h / (mm/s²)."""
     return f"{what} / {f'({unit})' if '/' in unit else unit}".removesuffix(" / ")
-
-
-DIGITS = 48
-"""Most digits of position numbers along the axis."""
-LOG_SCALE_RATIO = 20
-"""Ratio of mean squares from which on bars are drawn on a logarithmic scale."""
-
-
-def gap_figure(diagnosis: CampaignDiagnosis, positions: pd.DataFrame) -> Figure:
-    """Residuals of the held-out positions before and after, and their mean squares."""
-    gap = diagnosis.gap.held_out
-    assert gap is not None
-    figure = new_figure(FULL, 62)
-    ax, bars = figure.subplots(1, 2, width_ratios=[2.6, 1])
-    held = positions[positions["split"] == "held-out"]
-    before, after = (1e3 * held[f"predicted_{when}_mps2"] for when in ("before", "after"))
-    sigma = 1e3 * condition_sigma(diagnosis.final.solution, diagnosis.noise.variance)
-    place = np.arange(len(held))
-    ax.axhspan(0, sigma, color=NOISE, label="noise alone (1 σ)")
-    ax.vlines(place, after, before, color=OTHER_COLOUR, linewidth=0.8)
-    ax.plot(place, before, "s", color=BEFORE, label="without the effect")
-    ax.plot(place, after, "o", color=AFTER, label="with the effect")
-    # Labels of long numbers must not meet.
-    every = -(-len(held) * len(str(held["position"].max())) // DIGITS)
-    ax.set_xticks(place[::every], held["position"][::every])
-    ax.set(xlabel="held-out position", ylabel="residual, rms / (mm/s²)")
-    ax.set_ylim(0, 1.05 * max(before.max(), after.max(), sigma))
-    ax.grid(axis="x", visible=False)
-    figure.legend(loc="outside upper left", ncols=3)
-
-    heights = {"without": gap.before, "with": gap.after, "right\nmodel": gap.floor}
-    drawn = bars.bar(list(heights), list(heights.values()), color=[BEFORE, AFTER, OTHER_COLOUR])
-    bars.bar_label(drawn, [number(value) for value in heights.values()], padding=1, fontsize=7.5)
-    bars.axhline(1, color=INK, linewidth=0.8, linestyle=":")
-    bars.set_ylabel("mean square / noise variance")
-    if max(heights.values()) > LOG_SCALE_RATIO * min(heights.values()):
-        bars.set_yscale("log")
-    bars.margins(y=0.12)
-    bars.grid(axis="x", visible=False)
-    return figure

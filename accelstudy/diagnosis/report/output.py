@@ -30,11 +30,6 @@ from accelstudy.pages import write_page
 from accelstudy.pages.result import Result
 from accelstudy.sensors.frames import FRD, axes_note
 
-MODEL_HEADER = """\
-# The sensor and the noise that were found, as a study of their own:
-# snakemake --cores 2 --configfile config/config.yaml THIS_FILE
-"""
-
 
 class Diagnosis(Result):
     """A diagnosis: which effects, seen in a campaign, a model lacks.
@@ -111,10 +106,8 @@ class Diagnosis(Result):
             if made is not None:
                 write_json(folder / "calibration.json", made)
             with whole_file(folder / "model.yaml") as path:
-                text = yaml.safe_dump(
-                    document.study_overlay(d), sort_keys=False, allow_unicode=True
-                )
-                path.write_text(MODEL_HEADER + text, encoding="utf-8")
+                text = yaml.safe_dump(document.model_file(d), sort_keys=False, allow_unicode=True)
+                path.write_text(text, encoding="utf-8")
             write_page(
                 folder / "report.html",
                 "diagnosis/report/report.html.j2",

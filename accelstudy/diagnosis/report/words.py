@@ -11,7 +11,6 @@ from collections.abc import Mapping, Sequence
 from accelstudy.basics.levels import ACCEPTED, UNCHECKED
 from accelstudy.basics.units import GON, shown_unit
 from accelstudy.basics.wording import amount, comma_list, probability, words, words_with_counts
-from accelstudy.diagnosis.coordinates import TARGETS, coordinate_of
 from accelstudy.diagnosis.decision.posterior import Explanation
 from accelstudy.diagnosis.decision.statement import (
     Cosine,
@@ -22,7 +21,7 @@ from accelstudy.diagnosis.decision.statement import (
 from accelstudy.diagnosis.decision.verdict import Reason
 from accelstudy.diagnosis.result import CampaignDiagnosis, NamedCause
 from accelstudy.diagnosis.rules import RULES
-from accelstudy.diagnosis.shape import LearnedShape
+from accelstudy.diagnosis.shape import TARGETS, LearnedShape, coordinate_of
 from accelstudy.effects import Effect, get_effect
 from accelstudy.effects.learned import LEARNED, Learned
 from accelstudy.leveling.error import MAX_TILT_GON
@@ -150,16 +149,12 @@ def like_text(diagnosis: CampaignDiagnosis) -> str:
     if named and worth and worth[0].posterior < MIN_PLACE_SAID:
         return ""  # the figure has all of it
     places = {
-        f"{TARGETS[one.target].alone} that varies with {place_text(one.coordinate)}": one.posterior
+        f"{TARGETS[one.target].alone} that varies with {coordinate_of(one.coordinate).place}": (
+            one.posterior
+        )
         for one in worth
     }
     return _with_probabilities(places, "or")
-
-
-def place_text(coordinate: str) -> str:
-    """Say a coordinate without regard to the axes."""
-    of = coordinate_of(coordinate)
-    return of.place or of.words
 
 
 def extents_text(shape: LearnedShape) -> str:
@@ -169,12 +164,6 @@ def extents_text(shape: LearnedShape) -> str:
     return f"{comma_list(sizes)} {shown_unit(unit)}".rstrip()
 
 
-def formulas(shape: LearnedShape) -> str:
-    """Say which formulas a learned function may be."""
-    worth = {one.text: one.posterior for one in shape.formulas if one.posterior >= MIN_SAID}
-    return f"It varies {_with_probabilities(worth, 'or')}."
-
-
 def range_text(diagnosis: CampaignDiagnosis) -> str:
     """Say where a learned function is known; nothing if that is everywhere, or none was learned."""
     shape = diagnosis.shape
@@ -182,14 +171,6 @@ def range_text(diagnosis: CampaignDiagnosis) -> str:
         return ""
     of, settings = coordinate_of(shape.effect.coordinate), shape.effect.settings
     return f"{of.at(settings['low'])} to {of.at(settings['high'])}"
-
-
-def more_of_it(shape: LearnedShape) -> str:
-    """Say where a learned function is known least."""
-    of = coordinate_of(shape.effect.coordinate)
-    places = comma_list([of.at(place) for place in shape.least_known], "or")
-    session = " in another session" if of.is_course else ""
-    return f"Positions{session} where {of.words} is near {places}"
 
 
 # --- sets of explanations -----------------------------------------------------------------------

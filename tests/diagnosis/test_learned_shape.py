@@ -1,23 +1,17 @@
-"""A learned function: its formulas, its table, its figure, and what is said of it."""
+"""A learned function: its table, its figure, and what is said of it."""
 
 from dataclasses import replace
 
 import numpy as np
 import pytest
-from diagnosis_helpers import least
-from usual import NINE, ROBOT, G
+from usual import NINE, G
 
-from accelstudy.basics.units import GON, MGON
+from accelstudy.basics.units import MGON
 from accelstudy.campaign.session import Campaign
-from accelstudy.diagnosis.decision.functions import coordinate_values
-from accelstudy.diagnosis.decision.problem import fit_base
-from accelstudy.diagnosis.evidence.size import Evidence
-from accelstudy.diagnosis.formulas import rank_formulas
 from accelstudy.diagnosis.pipeline import diagnose
 from accelstudy.diagnosis.report.document import shape_document
 from accelstudy.diagnosis.report.figures import AXES, shape_figure
-from accelstudy.diagnosis.report.words import render, verdict_lines
-from accelstudy.diagnosis.space.frame import SessionFit
+from accelstudy.diagnosis.report.words import verdict_lines
 from accelstudy.effects import get_effect
 
 SIGMA, N = 2e-3, 40
@@ -44,51 +38,6 @@ def plain_campaign(rng):
         temperature=rng.uniform(10, 40, N),
         yaw=rng.uniform(-np.pi, np.pi, N),
     ), f
-
-
-def truths(campaign, f, rng):
-    """Functions of a coordinate, (n, 1) or (n, 3), with their effect and what is to be said."""
-    t, c, yaw = campaign.time[:, None], campaign.temperature[:, None], campaign.yaw[:, None]
-    phase, end = rng.uniform(0, 2 * np.pi), t.max()
-    temperature = f"coordinate=temperature, low={c.min()}, high={c.max()}"
-    time, force = f"coordinate=time, low=0, high={end}", f"coordinate=force, low={-G}, high={G}"
-    return [
-        (np.sin(2 * yaw + phase), "coordinate=yaw", "twice per turn"),
-        (np.exp(-t / rng.uniform(300, 600)), time, "decaying with a time constant"),
-        (np.sin(2 * np.pi * t / rng.uniform(500, 1100) + phase), time, "sine with a period"),
-        (c > rng.uniform(16, 34), temperature, "in a step between"),
-        (c, temperature, "in a straight line,"),
-        (f**3, force, "with its cube"),
-    ]
-
-
-def test_the_right_formula_comes_first():
-    """In most cases, at a noncentrality of 400."""
-    right = tried = 0
-    for seed in range(2):
-        rng = np.random.default_rng(seed)
-        campaign, f = plain_campaign(rng)
-        for h, words, said in truths(campaign, f, rng):
-            sizes = rng.uniform(0.5, 1.5, 2) * rng.choice([-1, 1], 2)
-            change = (h - np.mean(h)) * np.insert(sizes, tried % 3, 0.0)
-            # Large enough that the parameters of the model cannot take up most of it.
-            change *= np.sqrt(500 / np.sum(change**2)) * SIGMA
-            base = fit_base(replace(campaign, forces=campaign.forces + change), NINE, ROBOT)
-            frame = SessionFit.of(base.solution)
-            effect = get_effect(f"learned({words}, target=bias)")
-            formulas = rank_formulas(
-                frame,
-                Evidence(base.level, frame.residuals.redundancy),
-                effect,
-                (effect.coordinate, "bias"),
-                coordinate_values(effect, frame)[:, : 3 if effect.coordinate == "force" else 1],
-                np.zeros((len(frame.residuals.z), 0)),
-            )
-            assert sum(one.posterior for one in formulas) <= 1 + 1e-9
-            right += said in formulas[0].text
-            tried += 1
-    # Of 120 such campaigns 113 had the right one first.
-    assert right >= least(tried, 0.89)
 
 
 # --- one campaign, and all that is said of it ---------------------------------------------------
@@ -146,12 +95,8 @@ def test_what_was_learned_is_said(learned):
     assert shape.extents == pytest.approx(sizes, abs=3.6e-3)
     text = " ".join(verdict_lines(learned))
     said = " and ".join(f"{1e3 * size:.1f} ({axis})" for axis, size in shape.extents.items())
-    assert f"goes up and down by {said} mm/s². It varies once per turn (" in text
+    assert f"goes up and down by {said} mm/s²." in text
     assert "mgon with the function of the yaw" in text
-    places = " gon or ".join(f"{place / GON:.3g}" for place in shape.least_known[-2:])
-    assert places.replace("-", "−") in " ".join(render("advice", learned))
-    widest = np.sqrt(np.mean(shape.sigmas[:, :2] ** 2, axis=1))
-    assert shape.grid[np.argmax(widest)] in shape.least_known
 
 
 def test_the_figure_has_units_and_the_colours_of_the_axes(learned):
