@@ -205,7 +205,7 @@ def _prefers(
     variance = 1.0 if part.evidence.level.known else part.residuals.variance
     logs, of_group = [], []
     for one in finding.posterior.reported[: RULES.held_out_rivals + 1]:
-        if len(one.best) == 1 and one.best[0].effect is not None:
+        if len(one.best) == 1 and one.best[0].place is None:
             (columns,) = problem.frame.columns(one.best)
             left = missed - split.corrections(errors, [(0, columns, 0.0)])
             logs.append(-float(np.sum(left**2)) / (2 * variance))

@@ -114,7 +114,7 @@ def next_positions(
     first, second : explanations by effects
     """
     both, chosen, before = (first, second), list[NextPosition](), frame.forces[-1]
-    effects = [one.effect for one in (*first, *second) if one.effect is not None]
+    effects = (one.effect for one in (*first, *second))
     needed = {c for e in effects for c in compose(e.spec, (e.spec,)).hold_columns}
     names = [tuple(one.name for one in explanation) for explanation in both]
     only = [tuple(n for n in a if n not in b) for a, b in (names, names[::-1])]
@@ -196,7 +196,6 @@ def candidate_rows(
 
     columns = [rows_of(solution.model)]
     for one in explanation:
-        assert one.effect is not None
         alone = rows_of(SensorModel(one.name, (one.effect,)))
         columns.append(alone[..., : len(one.directions)] @ one.directions)
     return np.concatenate(columns, axis=-1)

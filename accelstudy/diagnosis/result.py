@@ -271,9 +271,7 @@ class CampaignDiagnosis:
         if best.place is not None:
             at = int(self.campaign.positions[best.place])
             return NamedCause(OUTLIER, OUTLIER, at, (OUTLIER,), p, cause.posterior)
-        assert best.effect is not None
         effect = best.distinguishable
-        assert effect is not None
         # What is beside a large effect was found in what its refit leaves.
         (here,) = (None,) if best.name == LEARNED else self.frame.hypotheses((best.effect,))
         like = () if here is None else self.frame.imitators(here)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 import pandas as pd
@@ -28,8 +28,7 @@ from accelstudy.simulation.sessions import Noise, session
 Array = NDArray[np.float64]
 
 
-@dataclass(frozen=True)
-class UpperLimit:
+class UpperLimit(NamedTuple):
     """Largest value of a parameter that the campaign does not exclude at 95 %, SI."""
 
     name: str
@@ -38,8 +37,7 @@ class UpperLimit:
     unit: str
 
 
-@dataclass(frozen=True)
-class Visibility:
+class Visibility(NamedTuple):
     """What a campaign or a scheme can show of an effect.
 
     Attributes
@@ -62,21 +60,15 @@ class Visibility:
     confused: tuple[tuple[str, float], ...] = ()
     easiest: Effect | None = None
 
-    @property
-    def unit(self) -> str:
-        """SI unit of the parameters."""
-        return get_effect(self.name).parameters[0].unit
-
 
 def signature_columns(frame: SessionFit, hypothesis: Hypothesis) -> Array:
     """Signature of each parameter of an effect in the residual space, (m, k)."""
-    assert hypothesis.effect is not None
     return frame.residuals.project(frame.rows(hypothesis.effect))
 
 
 def whole_shapes(shapes: Iterable[Hypothesis]) -> list[Hypothesis]:
     """Shapes of an effect in which all its parameters show."""
-    return [h for h in shapes if h.effect is not None and h.dim == len(h.effect.parameters)]
+    return [h for h in shapes if h.dim == len(h.effect.parameters)]
 
 
 def upper_limits(frame: SessionFit, known: bool, named: Sequence[str]) -> list[UpperLimit]:
@@ -97,7 +89,6 @@ def upper_limits(frame: SessionFit, known: bool, named: Sequence[str]) -> list[U
         if not whole:
             continue
         best = max(whole, key=lambda h: float(np.sum((frame.residuals.z @ h.basis) ** 2)))
-        assert best.effect is not None
         columns = signature_columns(frame, best)
         inverse = np.linalg.pinv(columns)
         residuals = frame.residuals
@@ -135,29 +126,14 @@ def visibilities(frame: SessionFit, alpha: float = 0.001) -> list[Visibility]:
         mdbs = [_size(root, s) for s in sizes]
         easiest = int(np.argmin(mdbs))
         best = judged[easiest]
-        near = frame.nearest(best)
-        rivals = [
-            max(
-                frame.candidates[other].hypotheses,
-                key=lambda h: float(cosines(best.ideal, h.ideal)[0]),
-            )
-            for other, cosine in near
-            if cosine <= RULES.alike
-        ]
-        left = sizes[easiest]
-        for rival in rivals:
-            rest = columns[easiest] - rival.basis @ (rival.basis.T @ columns[easiest])
+        near, left = frame.nearest(best), sizes[easiest]
+        for other in [other for other, cosine in near if cosine <= RULES.alike]:
+            rivals = frame.candidates[other].hypotheses
+            rival = max(rivals, key=lambda h: float(cosines(best.ideal, h.ideal)[0])).basis
+            rest = columns[easiest] - rival @ (rival.T @ columns[easiest])
             left = np.minimum(left, np.linalg.norm(rest, axis=0))
-        rows.append(
-            Visibility(
-                name=name,
-                status="visible",
-                mdb=mdbs[easiest],
-                mib=_size(root, left),
-                confused=near[:3],
-                easiest=best.effect,
-            )
-        )
+        mdb, mib = mdbs[easiest], _size(root, left)
+        rows.append(Visibility(name, "visible", "", mdb, mib, near[:3], best.effect))
     rows += [Visibility(name, "invisible") for name in frame.tested.invisible]
     rows += [Visibility(name, "untestable", why) for name, why in frame.tested.untestable.items()]
     return sorted(rows, key=lambda row: row.name)
@@ -203,31 +179,25 @@ def visibility_table(frame: SessionFit) -> pd.DataFrame:
     """Table for people: one row per effect that is not in the model, in the units shown."""
     rows = []
     for row in visibilities(frame):
-
-        def shown(size: float, unit: str = row.unit, seen: bool = row.status == "visible") -> str:
-            return amount(size, unit) if seen else "–"
-
+        effect, seen = get_effect(row.name), row.status == "visible"
+        unit = effect.parameters[0].unit
+        near = ", ".join(f"{name} {cosine:.2f}" for name, cosine in row.confused)
         rows.append(
             {
                 "effect": row.name,
-                "part": get_effect(row.name).part,
+                "part": effect.part,
                 "status": row.status,
-                "MDB": shown(row.mdb),
-                "MIB": shown(row.mib),
-                "unit": display_unit(row.unit) if row.status == "visible" else "",
-                "with": _settings(row.easiest),
-                "confused with": row.reason
-                or ", ".join(f"{name} {cosine:.2f}" for name, cosine in row.confused),
+                "MDB": amount(row.mdb, unit) if seen else "–",
+                "MIB": amount(row.mib, unit) if seen else "–",
+                "unit": display_unit(unit) if seen else "",
+                "with": "" if row.easiest is None else settings_text(row.easiest),
+                "confused with": row.reason or near,
             }
         )
     return pd.DataFrame(rows)
 
 
-def _settings(effect: Effect | None) -> str:
+def settings_text(effect: Effect) -> str:
     """Settings of an effect as it is written, with their units: ``t=290 s``."""
-    if effect is None:
-        return ""
-    units = {
-        setting.name: "" if setting.unit == "1" else f" {setting.unit}" for setting in effect.takes
-    }
+    units = {one.name: "" if one.unit == "1" else f" {one.unit}" for one in effect.takes}
     return ", ".join(f"{name}={value:.4g}{units[name]}" for name, value in effect.settings.items())

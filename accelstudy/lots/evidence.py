@@ -145,7 +145,7 @@ def _weighed(sensor: Sensor) -> SensorEvidence:
         }
     pairs = {}
     for pair in weigh_sets(singles.shapes, residuals, evidence, most=2):
-        one, other = sorted(shape.effect.name if shape.effect else "" for shape in pair.best)
+        one, other = sorted(shape.name if shape.place is None else "" for shape in pair.best)
         if one:
             pairs[one, other] = pair.log_density - nothing
     of_unit_weight = max(evidence.variance(square), MIN_VARIANCE)
@@ -157,13 +157,11 @@ def _weighed(sensor: Sensor) -> SensorEvidence:
         odds={name: log - nothing for name, log in logs.items()},
         pairs=pairs,
         classes=tuple(one.members for one in problem.classes),
-        specs={
-            name: best.effect.spec for name, best in singles.best.items() if best.effect is not None
-        },
+        specs={name: best.effect.spec for name, best in singles.best.items() if best.place is None},
         shapes={
             name: tuple(effect.spec for effect in effects)
             for name, shapes in problem.frame.candidates.items()
-            if (effects := [h.effect for h in shapes.hypotheses if h.effect is not None])
+            if (effects := [h.effect for h in shapes.hypotheses if h.place is None])
             and not effects[0].sudden
         },
         tested=dict(zip(problem.field.names, odds.T, strict=True)),

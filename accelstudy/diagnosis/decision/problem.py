@@ -244,7 +244,7 @@ class Problem:
             if log < least:
                 continue
             best = sorted(one.best, key=lambda h: -strength[h.name])
-            effects = [self.members[h.name] for h in best if h.effect is not None]
+            effects = [self.members[h.name] for h in best if h.place is None]
             if len(set(effects)) == len(effects):
                 named = (Cause(called.get(h.name, h.name), self.members[h.name], h) for h in best)
                 weighed.append(Explanation(tuple(named), log))

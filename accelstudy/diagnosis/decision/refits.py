@@ -27,7 +27,7 @@ RANGE_FACTOR = 1.6
 
 def refit(base: Solution, chosen: Sequence[Hypothesis]) -> Solution | None:
     """Fit with effects added and bumped positions left out; None if it has no solution."""
-    effects = [effect for h in chosen if (effect := h.distinguishable) is not None]
+    effects = [h.distinguishable for h in chosen if h.place is None]
     together = (*base.model.effects, *effects)
     try:
         model = SensorModel(composition_name(together), together) if effects else base.model
@@ -116,7 +116,6 @@ def with_settings(
         if one.smooth is None:
             continue
         shown, name, value = one.distinguishable, one.smooth, one.value
-        assert shown is not None
         psi = []
         for step in (-STEP, STEP):
             changed = type(shown)(**{**shown.settings, name: value * np.exp(step)})

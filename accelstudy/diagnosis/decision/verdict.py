@@ -112,11 +112,11 @@ def _judge(problem: Problem, posterior: Posterior) -> Finding:
         if fit is None or reason.code:
             return Finding("unknown", frame, reason, posterior=posterior)
         found = [replace(cause, posterior=top.posterior) for cause in fit[0]]
-        found.sort(key=lambda one: one.shape.effect is not None)
+        found.sort(key=lambda one: one.shape.place is None)
         credible, verdict = posterior.credible_set, ""
         of_effects = sum(one.posterior for one in credible if one.is_effects)
         sure = top.posterior >= RULES.sure
-        if sure and found[0].shape.effect is None:
+        if sure and found[0].shape.place is not None:
             verdict = "gross_error"
         elif top.posterior >= RULES.named:
             verdict = "named"
@@ -174,7 +174,7 @@ def dismiss_weak_evidence(problem: Problem, finding: Finding) -> Finding | None:
 def is_large(problem: Problem, single: Explanation) -> bool:
     """Whether an effect is so large that its signature to first order is not enough."""
     z, basis = problem.residuals.z, single.best[0].basis
-    return single.best[0].effect is not None and float(np.sum((z @ basis) ** 2)) > RULES.large
+    return single.best[0].place is None and float(np.sum((z @ basis) ** 2)) > RULES.large
 
 
 def posterior_by_refits(problem: Problem, single: Explanation, count: int) -> Posterior:
@@ -223,7 +223,7 @@ def _pairs_with(problem: Problem, alone: Explanation, solution: Solution) -> lis
         if name != UNKNOWN:
             other = inner.frame.candidates[name].strongest(z)
             cause = Cause(name, inner.members[name], other)
-            more = within_bounds((other,), z, inner.evidence)[0] - np.log(len(problem.classes))
+            more = within_bounds(other, z, inner.evidence) - np.log(len(problem.classes))
         weight = log + float(more + np.log(RULES.prior_two))
         weighed.append(Explanation((*alone.causes, cause), weight))
     return weighed

@@ -12,7 +12,7 @@ afterwards, and about zero with g C before.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from functools import lru_cache
 from itertools import product
 
 import numpy as np
@@ -31,72 +31,49 @@ MIN_PROBABILITY = 1e-300
 
 
 def within_bounds(
-    hypotheses: Sequence[Hypothesis],
-    z: Array,
-    evidence: Evidence,
-    others: Sequence[Array] = (),
-) -> Array:
-    """Log of the factor by which bounds change the density of residuals z (m,), (s,).
+    one: Hypothesis, z: Array, evidence: Evidence, beside: Array | None = None
+) -> float:
+    """Log of the factor by which the bounds of an effect change the density of residuals z (m,).
+
+    It is 0 for an effect without bounds.
 
     Parameters
     ----------
-    hypotheses : of effects; 0 for those that have no bounds
+    one : Hypothesis
     z : (m,) array
     evidence : Evidence
-    others : (m, k) arrays, orthonormal bases of what is beside each of them, if anything is
+    beside : (m, k) array, orthonormal basis of what is beside it
     """
-    logs, squares = np.zeros(len(hypotheses)), float(z @ z)
-    dims = np.array([0 if one.estimates is None else one.dim for one in hypotheses])
-    for d in np.unique(dims[dims > 0]):
-        alike = np.flatnonzero(dims == d)
-        means, covariances, sizes = (np.zeros((len(alike), *[d] * n)) for n in (1, 2, 0))
-        for row, i in enumerate(alike.tolist()):
-            one = hypotheses[i]
-            assert one.estimates is not None
-            information, seen, part, dim = np.eye(d), one.basis.T @ z, 0.0, d
-            if others:
-                # What is left of it, and of the residuals, beside the other one.
-                cross, along = one.basis.T @ others[i], others[i].T @ z
-                information -= cross @ cross.T
-                seen, part, dim = seen - cross @ along, float(along @ along), d + len(along)
-            covariance = np.linalg.inv(information)
-            part += float(seen @ covariance @ seen)
-            variance = evidence.variance(squares - part)
-            means[row] = one.estimates @ covariance @ seen
-            covariances[row] = variance * one.estimates @ covariance @ one.estimates.T
-            sizes[row] = max(part / variance, SIZES[0]) / dim
-        first = hypotheses[int(alike[0])].effect
-        assert first is not None
-        bounds = first.bounds
-        less = sizes / (1 + sizes)
-        after = box_probability(less[:, None] * means, less[:, None, None] * covariances, *bounds)
-        before = box_probability(0 * means, sizes[:, None, None] * covariances, *bounds)
-        logs[alike] = np.log(np.maximum(after, MIN_PROBABILITY)) - np.log(
-            np.maximum(before, MIN_PROBABILITY)
-        )
-    return logs
+    if one.estimates is None:
+        return 0.0
+    others = z[:, None][:, :0] if beside is None else beside
+    # What is left of it, and of the residuals, beside the others.
+    cross, along = one.basis.T @ others, others.T @ z
+    covariance = np.linalg.inv(np.eye(one.dim) - cross @ cross.T)
+    seen = one.basis.T @ z - cross @ along
+    part = float(along @ along + seen @ covariance @ seen)
+    variance = evidence.variance(float(z @ z) - part)
+    mean = one.estimates @ covariance @ seen
+    covariance = variance * one.estimates @ covariance @ one.estimates.T
+    size = max(part / variance, SIZES[0]) / (one.dim + len(along))
+    less, bounds = size / (1 + size), one.effect.bounds
+    after = box_probability(less * mean, less * covariance, *bounds)
+    before = box_probability(0 * mean, size * covariance, *bounds)
+    return float(np.log(max(after, MIN_PROBABILITY)) - np.log(max(before, MIN_PROBABILITY)))
 
 
-def box_probability(mean: Array, covariance: Array, low: float, high: float) -> Array:
-    """Probability that normal numbers are all between two bounds, (s,).
+def box_probability(mean: Array, covariance: Array, low: float, high: float) -> float:
+    """Probability that normal numbers, of mean (d,) and covariance (d, d), are between two bounds.
 
     One after the other is integrated over, given those before it (Genz 1992, J. Comput. Graph.
     Stat. 1, 141), by Gauss's rule.
-
-    Parameters
-    ----------
-    mean : (s, d) array
-    covariance : (s, d, d) array
-    low, high : float
     """
-    lower, d = np.linalg.cholesky(covariance), mean.shape[1]
-    x, w = np.polynomial.legendre.leggauss(NODES)
-    grid = np.array([*product((x + 1) / 2, repeat=d - 1)])
-    weights = np.prod([*product(w / 2, repeat=d - 1)], axis=1)
-    share, drawn = np.ones((len(mean), len(grid))), np.zeros((len(mean), len(grid), d))
+    lower, d = np.linalg.cholesky(covariance), len(mean)
+    grid, weights = _rule(d - 1)
+    share, drawn = np.ones(len(grid)), np.zeros((len(grid), d))
     for i in range(d):
-        given = mean[:, i, None] + np.einsum("sqj,sj->sq", drawn[..., :i], lower[:, i, :i])
-        a, b = ((bound - given) / lower[:, i, i, None] for bound in (low, high))
+        given = mean[i] + drawn[:, :i] @ lower[i, :i]
+        a, b = ((bound - given) / lower[i, i] for bound in (low, high))
         # In the upper tail probabilities are differences of numbers near 1: take the lower one.
         sign = np.where(a > 0, -1.0, 1.0)
         a, b = np.minimum(sign * a, sign * b), np.maximum(sign * a, sign * b)
@@ -105,5 +82,13 @@ def box_probability(mean: Array, covariance: Array, low: float, high: float) -> 
         share *= between
         if i < d - 1:
             at = np.clip(below + grid[:, i] * between, MIN_PROBABILITY, 1 - 1e-16)
-            drawn[..., i] = sign * ndtri(at)
-    return np.asarray(share @ weights)
+            drawn[:, i] = sign * ndtri(at)
+    return float(share @ weights)
+
+
+@lru_cache
+def _rule(d: int) -> tuple[Array, Array]:
+    """Gauss's rule for d numbers between 0 and 1: nodes (q, d) and their weights (q,)."""
+    x, w = np.polynomial.legendre.leggauss(NODES)
+    nodes = np.array([*product((x + 1) / 2, repeat=d)])
+    return nodes, np.prod([*product(w / 2, repeat=d)], axis=1)

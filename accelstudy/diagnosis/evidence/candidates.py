@@ -149,7 +149,7 @@ def weigh_singles(frame: SessionFit, evidence: Evidence) -> Singles:
         parts = own.parts(z)
         shapes[name], logs[name] = own, own.logs(evidence, parts, z @ z)
         if worth and own[0].estimates is not None:
-            within = within_bounds(own.hypotheses, z, evidence)
+            within = np.array([within_bounds(one, z, evidence) for one in own.hypotheses])
             logs[name] = logs[name] + within
             parts = parts + 2 * within
         best[name] = own[int(np.argmax(parts))]
@@ -193,7 +193,7 @@ def classes_of(singles: Singles, members: Mapping[str, tuple[str, ...]]) -> list
 def refine(frame: SessionFit, shapes: Hypotheses) -> Hypotheses:
     """Add shapes between the neighbours of the best one, and again between those."""
     z = frame.residuals.z
-    if shapes[0].effect is None or len(shapes) < 2:
+    if shapes[0].place is not None or len(shapes) < 2:
         return shapes
     if shapes[0].smooth is None:
         return _complete(frame, shapes)
@@ -220,7 +220,6 @@ def _reshape_all(
 
     None stands for settings that cannot be, too.
     """
-    assert hypothesis.effect is not None
     assert hypothesis.smooth is not None
     kind, name = type(hypothesis.effect), hypothesis.smooth
     shapes, hold = [kind(**{name: float(f"{v:.6g}")}) for v in values], frame.hold
@@ -235,14 +234,10 @@ def _complete(frame: SessionFit, shapes: Hypotheses) -> Hypotheses:
     z, hold = frame.residuals.z, frame.hold
     while True:
         best = int(np.argmax(shapes.parts(z)))
-        effect = shapes[best].effect
-        assert effect is not None
         fine = [*shapes.hypotheses]
         for near in (best + 1, best - 1):
             if 0 <= near < len(shapes):
-                other = shapes[near].effect
-                assert other is not None
-                between = effect.between(other, hold)
+                between = shapes[best].effect.between(shapes[near].effect, hold)
                 tried = frame.hypotheses(between) if between else []
                 fitting = [h for h in tried if h is not None and h.dim == shapes[best].dim]
                 fine[max(best, near) : max(best, near)] = fitting

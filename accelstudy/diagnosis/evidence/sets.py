@@ -110,6 +110,7 @@ class _Search:
         count, sizes = len(candidates), range(1, RULES.set_members + 1)
         self.priors = {size: set_prior(size, count) for size in sizes}
         self.shapes: list[Hypothesis] = []
+        self.factors: list[float] = []
         priors: list[Array] = []
         for name, shapes in candidates.items():
             places = np.arange(len(shapes))
@@ -118,8 +119,9 @@ class _Search:
                 places = np.sort(order[: RULES.set_positions])
             tried = [shapes[int(place)] for place in places]
             self.shapes += tried
-            priors.append(np.log(shapes.prior[places]) + self._bounds(tried))
-        self.shape_priors = np.concatenate(priors)
+            self.factors += [within_bounds(one, self.z, evidence) for one in tried]
+            priors.append(np.log(shapes.prior[places]))
+        self.shape_priors = np.concatenate(priors) + self.factors
         self.counts = [len(each) for each in priors]
         self.owners = np.repeat(np.arange(len(self.counts)), self.counts)
         self.firsts = np.cumsum([0, *self.counts[:-1]])
@@ -136,12 +138,6 @@ class _Search:
         self.found: dict[Places, tuple[float, tuple[int, ...]]] = {(): (nothing, ())}
         self.weights: dict[Places, float] = {}
         self.extended: set[Places] = set()
-
-    def _bounds(self, shapes: Sequence[Hypothesis], beside: Sequence[Array] = ()) -> Array:
-        """Log of the factors that bounds of parameters change the densities of shapes by."""
-        if all(shape.estimates is None for shape in shapes):
-            return np.zeros(len(shapes))
-        return within_bounds(shapes, self.z, self.evidence, beside)
 
     def extend(self, places: Places) -> None:
         """Weigh a set with each candidate, whose shapes are integrated."""
@@ -171,17 +167,19 @@ class _Search:
 
     def sets(self) -> list[EffectSet]:
         """Sets of two and more; in the strongest, bounds hold for each beside the others."""
-        several = [places for places in self.found if len(places) > 1]
-        best = {places: tuple(self.shapes[i] for i in self.found[places][1]) for places in several}
-        logs = {places: self.found[places][0] for places in several}
         least = max(self.weights.values(), default=0.0) - RULES.bounds_within
-        for places in several:
-            for one in best[places] if self.weights[places] > least else ():
-                if one.estimates is not None:
-                    others = [other.basis for other in best[places] if other is not one]
-                    beside = [column_basis(np.concatenate(others, axis=1))]
-                    logs[places] += float((self._bounds([one], beside) - self._bounds([one]))[0])
-        return [EffectSet(best[places], logs[places]) for places in several]
+        sets = []
+        for places, (log, chosen) in self.found.items():
+            if len(chosen) < 2:
+                continue
+            best = tuple(self.shapes[i] for i in chosen)
+            for one, i in zip(best, chosen, strict=True):
+                if self.weights[places] > least and one.estimates is not None:
+                    others = [other.basis for other in best if other is not one]
+                    beside = column_basis(np.concatenate(others, axis=1))
+                    log += within_bounds(one, self.z, self.evidence, beside) - self.factors[i]
+            sets.append(EffectSet(best, log))
+        return sets
 
     def _with_each_further(self, chosen: tuple[int, ...]) -> tuple[float, Array]:
         """Log density of the residuals with some shapes, and with each further one as well, (s,).

@@ -125,7 +125,7 @@ class SessionFit:
 
     def columns(self, hypotheses: Sequence[Hypothesis]) -> list[Array]:
         """What shapes of one effect show in the conditions of unit weight, (m, l) each."""
-        effects = [one.effect for one in hypotheses if one.effect is not None]
+        effects = [one.effect for one in hypotheses]
         shown = np.split(self.residuals.whiten(self.signatures(effects)), len(effects), axis=1)
         return [each @ one.directions for each, one in zip(shown, hypotheses, strict=True)]
 

@@ -28,6 +28,15 @@ Array = NDArray[np.float64]
 OUTLIER = "outlier_position"
 
 
+class _Shift(Effect):
+    """What a bumped position has in place of an effect: nothing that a model could have."""
+
+    name, parameters = OUTLIER, ()
+
+
+SHIFT = _Shift()
+
+
 @dataclass(frozen=True)
 class Hypothesis:
     """One shape of one thing that may be missing.
@@ -35,7 +44,7 @@ class Hypothesis:
     Attributes
     ----------
     name : str, canonical name
-    effect : Effect; None for what is no effect of the sensor or the rig
+    effect : Effect, in this shape
     directions : (k, l) array, combinations of the parameters that the positions show
     basis : (m, l) array, orthonormal, of the space of its signature in the residuals
     ideal : (m, l) array, likewise for an ideal sensor, at which equal effects are exactly equal
@@ -45,7 +54,7 @@ class Hypothesis:
     """
 
     name: str
-    effect: Effect | None
+    effect: Effect
     directions: Array
     basis: Array
     ideal: Array
@@ -58,16 +67,14 @@ class Hypothesis:
         return self.basis.shape[1]
 
     @property
-    def distinguishable(self) -> Effect | None:
+    def distinguishable(self) -> Effect:
         """Return the effect with as many of its parameters as the positions can tell apart.
 
         Those that no position shows are left out, unless something is known of them a priori.
         Where only combinations show, the parameters that are kept stand for them, and the others
         are zero.
         """
-        if self.effect is None or self.effect.informed:
-            return self.effect
-        if self.dim == len(self.effect.parameters):
+        if self.effect.informed or self.dim == len(self.effect.parameters):
             return self.effect
         from scipy.linalg import qr  # slow to import, and seldom needed
 
@@ -80,8 +87,6 @@ class Hypothesis:
 
         An effect that lacks what the setting shapes is no neighbour of those that do not.
         """
-        if self.effect is None:
-            return None
         values = self.effect.settings
         smooth = (s.name for s in self.effect.takes if s.smooth and values[s.name] != s.none)
         return next(smooth, None)
@@ -89,9 +94,7 @@ class Hypothesis:
     @property
     def value(self) -> float:
         """Value of the smooth setting; NaN if it has none."""
-        if self.effect is None or self.smooth is None:
-            return np.nan
-        return self.effect.settings[self.smooth]
+        return np.nan if self.smooth is None else self.effect.settings[self.smooth]
 
 
 @dataclass(frozen=True)
@@ -224,7 +227,7 @@ def outlying_positions(residuals: Residuals) -> list[Hypothesis]:
         rows = np.zeros((len(residuals.design), shift.shape[1]))
         rows[place * c : (place + 1) * c] = shift
         basis = residuals.project(rows)
-        found.append(Hypothesis(OUTLIER, None, shift, basis, basis, place))
+        found.append(Hypothesis(OUTLIER, SHIFT, shift, basis, basis, place))
     return found
 
 
