@@ -110,4 +110,4 @@ def test_a_sensor_whose_range_is_far_beyond_gravity_does_not_saturate():
     measured = campaign(3)
     assert "saturation" in examine_campaign(measured, NINE).candidates
     wide = examine_campaign(replace(measured, full_range=8 * G), NINE)
-    assert wide.invisible == ("gravity_error", "saturation")
+    assert wide.tested.invisible == ("gravity_error", "saturation")

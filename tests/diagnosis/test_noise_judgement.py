@@ -84,8 +84,7 @@ def judged(monkeypatch, name, factor=1.5, of_noise=0.5, fit=0.5):
     ]
     monkeypatch.setattr(verdict, "lack_of_fit", lambda one: fit)
     test = NoiseTest(name, 1.0, 1e-6, (factor,), "what it says")
-    problem, posterior = SimpleNamespace(frame="fit"), Posterior.of(weighed)
-    return judge_noise(SimpleNamespace(problem=problem, posterior=posterior), test)
+    return judge_noise(SimpleNamespace(frame="fit", posterior=Posterior.of(weighed)), test)
 
 
 @pytest.mark.parametrize(("case", "said", "code"), [
@@ -101,8 +100,7 @@ def judged(monkeypatch, name, factor=1.5, of_noise=0.5, fit=0.5):
 def test_what_a_significant_test_means(monkeypatch, case, said, code):
     """Larger residuals may be an effect; a misfit that repeats share is no noise, but steps are."""
     found = judged(monkeypatch, **case)
-    assert (found.verdict, found.code) == (said, code)
-    assert found.posterior is not None
+    assert (found.verdict, found.reason.code) == (said, code)
     if code == "noise or effect":
         assert found.reason.facts["p"] == pytest.approx(case["of_noise"])
         assert found.reason.facts["other"] == "hysteresis"

@@ -238,7 +238,7 @@ def _complete(frame: SessionFit, shapes: Hypotheses) -> Hypotheses:
         for near in (best + 1, best - 1):
             if 0 <= near < len(shapes):
                 between = shapes[best].effect.between(shapes[near].effect, hold)
-                tried = frame.hypotheses(between) if between else []
+                tried = frame.hypotheses(between)
                 fitting = [h for h in tried if h is not None and h.dim == shapes[best].dim]
                 fine[max(best, near) : max(best, near)] = fitting
         if len(fine) == len(shapes):

@@ -131,6 +131,8 @@ class SessionFit:
 
     def hypotheses(self, shapes: Sequence[Effect]) -> list[Hypothesis | None]:
         """Return what shapes of an effect would leave in the residuals; None for nothing."""
+        if not shapes:
+            return []
 
         def of_each(columns: Array) -> Array:
             """Columns (m, s k) of all shapes as those of each, (s, m, k)."""
