@@ -8,7 +8,7 @@ KEYWORDS = {
     "advise": {"watch": "`watch -n 2 accelstudy advise ...` of the shell asks again and again"},
     "apply": NO_DELIMITER,
     "data_sheet": NO_DELIMITER,
-    "diagnose": {"replicates": "nothing is simulated; model.yaml is a study that does it"},
+    "diagnose": {"replicates": "nothing is simulated; linear theory says what simulations find"},
     "export": {
         "level": "roll = atan2(-f_y, -f_z) and pitch = atan2(f_x, hypot(f_y, f_z)) of the "
         "calibrated force in frd (guide 'On a device'); `accelstudy apply` gives them with their "
