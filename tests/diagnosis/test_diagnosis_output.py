@@ -125,8 +125,7 @@ def test_every_verdict_is_written_and_told(written, case):
         assert "on data that were not used?" in text_of(page)
     if case == "gross_error":
         assert [effect["name"] for effect in content["effects"]] == ["axis_error", "row_order"]
-        assert "The forces of positions 3, 9 are exchanged. As they are, the data" in text_of(page)
-        assert "It concerns the noise" not in page
+        assert "the forces of positions 3, 9 are exchanged" in text_of(page).lower()
     if case == "gravity":
         assert "mounting rotation" in page.split("What can this campaign not see?")[1]
 

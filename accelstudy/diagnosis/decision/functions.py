@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections import defaultdict
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
@@ -188,8 +188,7 @@ def _shape(settings: dict[str, str | float]) -> Learned:
 # --- the fit ------------------------------------------------------------------------------------
 
 
-@dataclass(frozen=True)
-class PlaceShape:
+class PlaceShape(NamedTuple):
     """A shape, and how probable it is of each size.
 
     Attributes
@@ -206,37 +205,24 @@ class PlaceShape:
     trace: float
     logs: Array
 
-    @classmethod
-    def of(
-        cls,
-        effect: Learned,
-        frame: SessionFit,
-        residuals: Residuals,
-        errors: Array,
-        evidence: Evidence,
-    ) -> PlaceShape | None:
-        """Weigh a shape by errors (b, m) in a space of residuals; None if too little shows."""
-        rows = frame.rows(effect) * effect.deviations
-        left = residuals.project(rows)
-        trace = float(np.sum(left**2))
-        if not trace > RULES.visible_shape * float(np.sum(rows**2)):
-            return None
-        values, turned = np.linalg.eigh(left.T @ left)
-        kept = values > 1e-6 * trace
-        vectors = left @ turned[:, kept] / np.sqrt(values[kept])
-        shares, squares = values[kept] / trace, np.sum(errors**2, axis=1)
-        logs = evidence.densities_by_size((errors @ vectors) ** 2, shares, squares, SIZES)
-        return cls(effect, vectors, shares, trace, logs)
-
 
 def weigh_place(
     place: Place, frame: SessionFit, residuals: Residuals, errors: Array, evidence: Evidence
 ) -> list[PlaceShape]:
-    """Shapes of a place, weighed by errors (b, m) in the space of residuals of a frame."""
-    each = (
-        PlaceShape.of(one, frame, residuals, errors, evidence) for one in shapes_of(place, frame)
-    )
-    return [one for one in each if one is not None]
+    """Shapes of a place that show, weighed by errors (b, m) in a space of residuals of a frame."""
+    weighed, squares = [], np.sum(errors**2, axis=1)
+    for effect in shapes_of(place, frame):
+        rows = frame.rows(effect) * effect.deviations
+        left = residuals.project(rows)
+        trace = float(np.sum(left**2))
+        if trace > RULES.visible_shape * float(np.sum(rows**2)):
+            values, turned = np.linalg.eigh(left.T @ left)
+            kept = values > 1e-6 * trace
+            vectors = left @ turned[:, kept] / np.sqrt(values[kept])
+            shares = values[kept] / trace
+            logs = evidence.densities_by_size((errors @ vectors) ** 2, shares, squares, SIZES)
+            weighed.append(PlaceShape(effect, vectors, shares, trace, logs))
+    return weighed
 
 
 def fit_of_place(
