@@ -2,6 +2,7 @@
 
 import tracemalloc
 from dataclasses import replace
+from itertools import product
 
 import numpy as np
 import pytest
@@ -24,10 +25,18 @@ from accelstudy.approaches import get_approach
 from accelstudy.basics.errors import InputError
 from accelstudy.campaign.calibration.fit import fit_campaign
 from accelstudy.campaign.calibration.result import Calibration
-from accelstudy.diagnosis.evidence.noise_models import LENGTHS, STRENGTHS, colour_densities
+from accelstudy.diagnosis.evidence.noise_models import (
+    CONTRASTS,
+    LENGTHS,
+    LOG_RATIOS,
+    STRENGTHS,
+    UnequalAxes,
+    colour_densities,
+)
 from accelstudy.diagnosis.evidence.noise_tests import axis_factors
 from accelstudy.diagnosis.evidence.size import Evidence, Level, log_mean
 from accelstudy.diagnosis.pipeline import diagnose
+from accelstudy.diagnosis.rules import RULES
 from accelstudy.diagnosis.space.frame import SessionFit
 from accelstudy.diagnosis.space.hypotheses import clusters, repeats_of
 from accelstudy.effects import HoldConditions, get_effect
@@ -212,6 +221,24 @@ def test_coloured_noise_has_the_likelihood_of_whole_covariance_matrices(frame):
             determinant = np.linalg.slogdet(covariance)[1]
             logs.append(np.logaddexp.reduce(evidence.noise_density(square, determinant)))
         assert log == pytest.approx(log_mean(np.array(logs)), rel=1e-9)
+
+
+def test_unequal_axes_have_the_likelihood_of_whole_covariance_matrices(frame):
+    residuals, r = frame.residuals, frame.residuals.redundancy
+    n, c = residuals.whitening.shape[:2]
+    basis = complement(residuals.design)
+    z = basis.T @ residuals.z
+    g = np.einsum("ncr,nca->arn", basis[: n * c].reshape(n, c, -1), residuals.force_noise)
+    evidence, logs, prior = Evidence(Level.of_stated_sigma(), r), [], []
+    for contrasts in product(LOG_RATIOS, LOG_RATIOS):
+        ratios = np.exp(np.array(contrasts) @ CONTRASTS)
+        covariance = np.eye(r) + sum((k - 1) * a @ a.T for k, a in zip(ratios, g, strict=True))
+        square, determinant = z @ np.linalg.solve(covariance, z), np.linalg.slogdet(covariance)[1]
+        logs.append(np.logaddexp.reduce(evidence.noise_density(square, determinant)))
+        prior.append(np.exp(-(np.hypot(*contrasts) ** 2) / (2 * RULES.spread_axes**2)))
+    equal = np.logaddexp.reduce(evidence.noise_density(z @ z))
+    found = UnequalAxes.of(residuals, evidence, None).log_evidence
+    assert found == pytest.approx(float(log_mean(np.array(logs), prior) - equal), abs=1e-8)
 
 
 def test_factors_of_the_axes_are_those_of_whole_matrices(frame):
