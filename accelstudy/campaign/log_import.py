@@ -73,16 +73,16 @@ class LogImport:
         """Write the folder of the campaign, with its figure."""
         write_imported(self.campaign, self.holds, folder, self.figure)
 
-    def tell(self, place: Path | None) -> None:
+    def tell(self, place: Path) -> None:
         """Print what was imported, with its warnings, and where to."""
         for line in self.campaign.notes:
             say(line)
         for warning in self.campaign.warnings:
             warn(warning)
-        if place is not None and self.figure and self.holds is not None:
+        if self.figure and self.holds is not None:
             say(f"figure: {place / 'segmentation.png'}")
         positions = plural(self.campaign.n_positions, "position")
-        show(f"campaign: {place or '--out FOLDER keeps it'} ({positions})")
+        show(f"campaign: {place} ({positions})")
 
 
 def settings_of(given: Mapping[str, Any]) -> ImportSettings:

@@ -20,7 +20,7 @@ from typing import Any
 import click
 
 from accelstudy.basics.arguments import as_sequence
-from accelstudy.basics.errors import OPTIONS
+from accelstudy.basics.errors import OPTIONS, InputError
 from accelstudy.basics.names import matches
 from accelstudy.basics.progress import feedback, stage
 from accelstudy.basics.units import ANGLE_UNIT_VARIABLE, angles_in
@@ -76,7 +76,8 @@ class Command(click.Command):
     writes : Kind of the folder that --out names; of a result that is a file, a context manager as
         `accelstudy.files.outputs.new_file`
     out : str, help of --out
-    optional : bool, whether nothing is written without --out
+    optional : bool, whether nothing is written without --out; or str, an argument without which
+        alone this is so
     tell : function that prints what the verb returns, if that does not tell itself
     options : further options, which come after that of --out
     sections : mapping of a title of the help to names of options, in the order of the help
@@ -91,7 +92,7 @@ class Command(click.Command):
         make: Callable[..., Any] | str = "",
         writes: OutputKind | Place | None = None,
         out: str = "Folder to write to.",
-        optional: bool = False,
+        optional: bool | str = False,
         tell: Callable[[Any], None] = tell_value,
         options: Iterable[click.Option] = (),
         sections: Mapping[str, str] | None = None,
@@ -177,6 +178,9 @@ class Command(click.Command):
     def _save(self, *, out: Path | None = None, **given: Any) -> None:
         """Write the result to --out, and print what it says."""
         force = self.writes is not None and given.pop("force")
+        optional = self._options[0]
+        if out is None and isinstance(optional, str) and given[optional] is not None:
+            raise InputError(f"--out: give the folder for {given[optional]}")
         with self._place(out, force, given) as part:
             make = resolve_name(self.make) if isinstance(self.make, str) else self.make
             result = make(**given)

@@ -101,7 +101,7 @@ SECTIONS = {
             campaigns.public,
             make="accelstudy.campaign.log_import:LogImport.of_public",
             writes=outputs.CAMPAIGN,
-            optional=True,
+            optional="name",
             tell=listings.tell_public,
         ),
         Command(

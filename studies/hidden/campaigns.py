@@ -29,6 +29,8 @@ Config = HiddenConfig | RealNoiseConfig
 
 def parse_hidden(content: Mapping[str, Any], source: str = "config") -> Config:
     """Check a configuration of either study; raise `InputError` with one line."""
+    if not content:
+        raise InputError("name a study: --configfile studies/hidden/config/hidden-effects.yaml")
     if "logs" in content:
         return validate(RealNoiseConfig, content, source)
     return validate(HiddenConfig, content, source)

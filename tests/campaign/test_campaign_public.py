@@ -101,9 +101,9 @@ def test_command(tmp_path):
 
 
 @pytest.mark.parametrize(("arguments", "message"), [
-    (["xsens"], "unknown public data 'xsens'; did you mean 'xsens-mti'?"),
+    (["xsens", "--out", "out"], "unknown public data 'xsens'; did you mean 'xsens-mti'?"),
     (["ferraris-sections", "--out", "out"], "'ferraris-sections' hold no forces"),
-    (["xsens-mti"], "--out: give the folder of the campaign"),
+    (["xsens-mti"], "--out: give the folder for xsens-mti"),
 ])  # fmt: skip
 def test_command_refuses(arguments, message):
     assert message in refusal("public", *arguments)

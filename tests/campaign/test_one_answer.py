@@ -48,18 +48,15 @@ def test_nine_positions_of_rank_eight(tmp_path, directions):
     assert "not determined yet" in said
     assert "CAN STOP" not in said.upper()
     # And before anything is measured.
-    scheme, allowed = tmp_path / "nine.yaml", tmp_path / "nine.csv"
+    scheme = tmp_path / "nine.yaml"
     scheme.write_text(yaml.safe_dump({"scheme": "nine", "directions": directions.tolist()}))
     assert re.search(r" 8/9 .* s_x, s_y, s_z", succeed("schemes", scheme).output)
-    np.savetxt(allowed, directions, delimiter=",", header="x,y,z", comments="")
-    asked = ("--attitudes", allowed, "--positions", 9, "--approach", "gravity")
+    asked = ("--attitudes", scheme, "--positions", 9, "--approach", "gravity")
     assert says in refusal("design", *asked, "--out", tmp_path / "design.yaml")
     scheme.write_text(
         yaml.safe_dump({"scheme": "nine", "directions": np.tile(directions, (2, 1)).tolist()})
     )
-    question = Question(
-        10 * MGON, 30 * GON, sheet_of_sigma(0.002), (BY_HAND,), schemes=(str(scheme),)
-    )
+    question = Question(10 * MGON, 30 * GON, sheet_of_sigma(0.002), (BY_HAND,))
     models = [get_model("bias-scale-nonorthogonality")]
     planned = [*in_scheme(question, get_scheme(str(scheme)), models)]
     assert all(each.tilt.rms.max() > 1 * GON for each in planned)

@@ -99,10 +99,10 @@ def test_a_warm_up_far_above_the_noise_needs_no_second_effect(tau, seed):
 
 def test_hard_clipping_has_its_name_or_none():
     """An output that does not change has no inverse; at this knee one axis never clips."""
-    found = diagnose(campaign(1, effects=("saturation(knee=9.6): 1, 1, 1",))[0], NINE)
+    found = diagnose(campaign(1, effects=("saturation(knee=9.6): 1, 1, 1",)), NINE)
     assert (found.verdict, [one.name for one in found.found]) == ("named", ["saturation"])
     assert found.gap.confirmed
-    clipped = campaign(1, effects=("saturation(knee=9.4): 1, 1, 1",), approach="gravity")[0]
+    clipped = campaign(1, effects=("saturation(knee=9.4): 1, 1, 1",), approach="gravity")
     found = diagnose(clipped, NINE)
     assert found.verdict == "unknown"
     assert found.reason == Reason.of("no solution", names=("saturation",))
@@ -134,6 +134,6 @@ ROTATIONS = {
     ("robot", "gravity_error", {"gravity_error"}),
 ])  # fmt: skip
 def test_what_an_approach_cannot_see_it_says(approach, effect, invisible):
-    found = diagnose(campaign(3, approach=approach, effects=(effect,))[0], NINE)
+    found = diagnose(campaign(3, approach=approach, effects=(effect,)), NINE)
     assert found.verdict == "no_effect"
     assert set(found.invisible) == invisible

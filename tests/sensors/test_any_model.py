@@ -2,8 +2,9 @@
 
 import json
 import re
-from functools import cache
+from functools import cache, partial
 
+import gross
 import numpy as np
 import pandas as pd
 import pytest
@@ -105,29 +106,33 @@ def test_a_diagnosis_writes_the_calibration_of_what_it_found(made, diagnosed):
 
 
 @cache
-def calibration_of(**settings):
+def calibration_of(wrong=lambda campaign: campaign, **settings):
     """A campaign, its diagnosis, and the calibration that this writes."""
-    campaign = acs.simulate_campaign(scheme="fibonacci-30", **settings)
+    campaign = wrong(acs.simulate_campaign(scheme="fibonacci-30", **settings))
     diagnosis = diagnose(campaign, get_model(NINE))
     return campaign, diagnosis, diagnosed_calibration(diagnosis)
 
 
-@pytest.mark.parametrize(("error", "words"), [
-    ("axis_error(x=-2, y=1, z=3)", "axes are swapped: x is read as y, y is read as −x"),
-    ("unit_error(force=0.1019716212978)", "the forces are in g"),
-    ("unit_error(angle=0.9)", "the robot's angles are in degrees"),
-])  # fmt: skip
-def test_a_calibration_of_mended_data_says_so(error, words):
+IN_G = partial(gross.unit, force=1 / 9.80665)
+
+
+@pytest.mark.parametrize(("wrong", "words", "turned"), [
+    (partial(gross.axes, x=-2, y=1, z=3), "axes are swapped: x is read as y, y is read as −x",
+     True),
+    (IN_G, "the forces are in g", True),
+    (partial(gross.unit, angle=0.9), "the robot's angles are in degrees", False),
+], ids=["axes", "g", "degrees"])  # fmt: skip
+def test_a_calibration_of_mended_data_says_so(wrong, words, turned):
     whole = calibration_of()[2]
     assert whole["mended"] is None
-    campaign, diagnosis, content = calibration_of(gross_errors=(error,))
+    campaign, diagnosis, content = calibration_of(wrong)
     assert (content["mended"]["reason"], whole["warnings"]) == (words, [])
     assert words in content["warnings"][0]
     for ours, right in zip(content["parameters"], whole["parameters"], strict=True):
         assert ours["value"] == pytest.approx(right["value"], abs=1e-6)
-    matrix = np.eye(3) if "angle" in error else content["mended"]["matrix"]
+    matrix = content["mended"]["matrix"] if turned else np.eye(3)
     np.testing.assert_allclose(campaign.forces @ np.transpose(matrix), diagnosis.campaign.forces)
-    assert (content["mended"]["matrix"] is None) == ("angle" in error)
+    assert (content["mended"]["matrix"] is not None) == turned
 
 
 def test_a_calibration_with_the_noise_that_was_found():
@@ -191,7 +196,7 @@ def log_of(forces, folder):
 
 
 def test_apply_mends_readings_as_the_data_were(tmp_path):
-    campaign, _, content = calibration_of(gross_errors=("unit_error(force=0.1019716212978)",))
+    campaign, _, content = calibration_of(IN_G)
     path = tmp_path / "calibration.json"
     path.write_text(json.dumps(content), encoding="utf-8")
     log, right = log_of(campaign.forces, tmp_path), read_calibration(path)

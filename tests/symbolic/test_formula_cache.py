@@ -68,7 +68,7 @@ def test_kept_functions_give_the_same_bits_and_are_not_made_again(monkeypatch):
 
 LATER = """\
 import sys
-import accelstudy.campaign.batch, accelstudy.study.config
+import accelstudy.campaign.format, accelstudy.study.config
 print([name for name in ("sympy.core", "matplotlib", "scipy.stats") if name in sys.modules])
 from accelstudy.sensors.models import get_model
 print(get_model("bias-scale").sense([[0.0, 0.0, -9.8]], [0.001] * 6).tolist())
