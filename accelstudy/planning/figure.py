@@ -46,7 +46,7 @@ def draw_plan(ax: Axes, plan: Plan) -> None:
         ax.plot(*place, marker=approach_marker(name), ms=5, mfc="white",
                 mec=approach_colour(name), ls="", zorder=5)  # fmt: skip
         ax.annotate(
-            str(number), place, xytext=(0, 11 if number % 2 else -11), textcoords="offset points",
+            str(number), place, xytext=(0, -11 if number % 2 else 11), textcoords="offset points",
             ha="center", va="center", color=approach_colour(name), zorder=6,
             bbox={"facecolor": "white", "edgecolor": "none", "pad": 0.5, "alpha": 0.8},
         )  # fmt: skip
