@@ -27,7 +27,7 @@ export OPENBLAS_NUM_THREADS := 1
 export OMP_NUM_THREADS := 1
 export MKL_NUM_THREADS := 1
 
-.PHONY: help env test golden golden-renew coverage test-processors test-processors-part test-cluster test-breaks smoke reproduce anew unlock report campaigns positions hidden-effects hidden-docs real-noise optimal-schemes pictures benchmarks docs wheel lint lock clean
+.PHONY: help env test golden golden-renew coverage test-processors test-processors-part test-cluster test-breaks smoke reproduce anew unlock report positions hidden-effects hidden-docs real-noise optimal-schemes pictures benchmarks docs wheel lint lock clean
 
 help: ## list the targets
 	@awk -F ':.*## ' '/^[a-z-]+:.*## / { printf "%-18s%s\n", $$1, $$2 }' Makefile

@@ -37,6 +37,7 @@ SKIPPED = {
     "make": "needs the repository, and minutes",
     "snakemake": "needs the repository, and minutes",
     "accelstudy public [a-z].*": "downloads; the part `logs` does the same",
+    r"accelstudy batch 'campaigns/\*'": "takes the campaigns of the log that are downloaded",
     "accelstudy plan": "stands in the part `plans`",
     "accelstudy claims": "stands in the parts `paper` and `smoke`",
     "tail .*running/positions.csv": "waits; the part `advise` goes through the session",
