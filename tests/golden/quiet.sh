@@ -19,6 +19,12 @@ accelstudy design --quiet --positions 6 --starts 1 --model bias --attitudes cube
 accelstudy schemes --quiet faces-6
 accelstudy effects --quiet
 accelstudy public --quiet
+accelstudy batch of-spring of-autumn --quiet --out batch
+accelstudy models --quiet | tail -n 3
+accelstudy scheme --quiet faces-6
+accelstudy cells --quiet config/config.yaml config/smoke.yaml | tail -n 3
+accelstudy config-schema --quiet | tail -n 3
+accelstudy init my-study --quiet
 accelstudy export calibrated/calibration.json --form json
 accelstudy export calibrated/calibration.json --form c
 accelstudy export calibrated/calibration.json --quiet --form matrix

@@ -40,7 +40,6 @@ SKIPPED = {
     r"accelstudy batch 'campaigns/\*'": "takes the campaigns of the log that are downloaded",
     "accelstudy plan": "stands in the part `plans`",
     "accelstudy claims": "stands in the parts `paper` and `smoke`",
-    "tail .*running/positions.csv": "waits; the part `advise` goes through the session",
     r".*(zsh|fish)_source": "is for another shell",
 }
 """Beginnings of commands that are not run -> why."""
