@@ -177,7 +177,7 @@ class TiltDistribution:
             apart = single[:, i] - mean[:, i, None]
             slope = np.linalg.lstsq(apart @ apart.T, apart @ (each - larger[i]), rcond=1e-9)[0]
             larger[i] += slope @ missed[:, i]
-        return np.asarray(larger)
+        return np.clip(larger, 0.0, 1.0)
 
     def _ends(self, bounds: Array) -> Array:
         """Lengths of y from and to which errors are below bounds (k,): (2, angle, k, direction)."""
