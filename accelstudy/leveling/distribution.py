@@ -26,7 +26,7 @@ NODES = 28
 """Nodes of the inverse Laplace transform; its error is below 1e-9."""
 CENTRAL = 1e-6
 """Offsets below this share of the mean square count as none."""
-STEPS = 20
+STEPS = 40
 """Most steps of the secant method for a quantile."""
 LEAST_STEP = 1e-6
 """Shorter ones, of the logarithm of a quantile, do not tell a slope."""
@@ -254,7 +254,7 @@ def _solved(scores: Callable[[Array], Array], start: Array, wanted: Array) -> Ar
             known = np.isfinite(found) & (found > 0) & (np.abs(at - before) > LEAST_STEP)
             slope = np.where(known, found, slope)
             # Where a share is 0 or 1, the quantile is some way further.
-            step = np.where(np.isfinite(here), (wanted - here) / slope, -0.1 * np.sign(here))
+            step = np.where(np.isfinite(here), (wanted - here) / slope, -0.5 * np.sign(here))
             to = at + np.clip(step, -1.0, 1.0)
             half = (low + high) / 2
             to = np.where(((to < low) | (to > high)) & np.isfinite(half), half, to)
