@@ -48,10 +48,6 @@ class Base(Effect):
 class Mine(Base):
 """
 BAD = {
-    "syntax": ("x = (", "SyntaxError: '(' was never closed (bad.py, line 1)"),
-    "raises": ("x = 1\ny = x / 0", "line 2: ZeroDivisionError: division by zero"),
-    "leaves": ("class Away(BaseException): pass\nraise Away('off')", "line 2: Away: off"),
-    "nothing": ("x = 1", "registers nothing; expected a class or a function under @register"),
     "twice": (f"{HEAD}    name = 'bias'", "the effect 'bias' is there already; choose another"),
     "words": (f"{HEAD}    name = 'my own'", "'my own': a name has letters, digits and _ only"),
     "parameter": (
@@ -95,12 +91,6 @@ def test_the_catalogue_shows_it_and_whose_it_is(words):
     assert text.count("of the plug-in ") == text.count("of the plug-in ripple.py") == 1
 
 
-def test_without_it_one_line_says_how_to_name_it():
-    line = refusal("calibrate", "nowhere", "--model", "bias-scale+ripple", "--out", "new")
-    assert "unknown model or effect 'ripple'" in line
-    assert "name its file with --plugin" in line
-
-
 def test_what_a_page_suggests_names_it_too():
     hidden = ("--effect", "ripple: 0.006, -0.004, 0.005")
     succeed("simulate-campaign", "--plugin", "ripple.py", "--out", "mine", *hidden)
@@ -118,10 +108,8 @@ def test_a_bad_one_is_one_line(case):
 
 
 def test_one_that_is_no_file_is_one_line():
-    assert refusal("--plugin", "no.py", "effects") == "error: no.py: no such file\n"
     os.mkfifo("pipe.py")  # nobody writes to it, so to open it would last for ever
-    for path in (".", "/dev/zero", "pipe.py"):
-        assert f"{path}: is no file" in refusal("--plugin", path, "effects")
+    assert "pipe.py: is no file" in refusal("--plugin", "pipe.py", "effects")
 
 
 def test_the_help_loads_none():
@@ -158,16 +146,6 @@ def test_a_configuration_names_it():
     assert "ripple" in effect_names()
     content = study.model_dump(mode="json")
     assert config_hash(content) == config_hash({**content, "plugins": ["other/ripple.py"]})
-
-
-@pytest.mark.parametrize(("given", "reason"), [
-    ("no.py", "study.yaml: plugins: no.py: no such file"),
-    (3, "study.yaml: plugins: must be "),
-    ([["ripple.py"]], "study.yaml: plugins.0: must be a text"),
-])  # fmt: skip
-def test_a_bad_key_is_one_line(given, reason):
-    with refused(start=reason):
-        read_study(written(plugins=given))
 
 
 def test_a_configuration_may_have_digests(capsys):

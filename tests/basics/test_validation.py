@@ -9,7 +9,6 @@ from places import ROOT
 from pydantic import BaseModel, Field, create_model
 
 from accelstudy.basics.errors import InputError
-from accelstudy.campaign.header import LogLayout
 from accelstudy.files.validation import ConfigSection, validate
 
 
@@ -74,8 +73,3 @@ def test_all_errors_are_in_plain_words():
                     said.add(re.sub(r"[‘'\"].*?[’'\"]|\(known: .*", "", str(error)))
     assert len(said) > 1500
     assert [text for text in said if re.search(MARKS, text)] == []
-
-
-def test_one_of_two_kinds_is_said_with_both():
-    with refused(start="log: columns.fx: must be a whole number or a text, not 0.5"):
-        validate(LogLayout, {"columns": {"fx": 0.5}}, "log")

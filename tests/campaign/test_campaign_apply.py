@@ -1,6 +1,5 @@
 """A calibration applied to readings, and leveling with its sigmas."""
 
-import json
 from dataclasses import replace
 
 import numpy as np
@@ -8,7 +7,6 @@ import pandas as pd
 import pyarrow as pa
 import pyarrow.parquet as pq
 import pytest
-from calling import refused
 from campaign_helpers import simulated_campaign
 from usual import NINE, ROBOT
 
@@ -17,7 +15,7 @@ from accelstudy.adjustment import calibrate
 from accelstudy.basics.errors import InputError
 from accelstudy.basics.units import GON, MGON
 from accelstudy.campaign.calibration.leveling import level
-from accelstudy.campaign.calibration.sensor_calibration import calibration_of, read_calibration
+from accelstudy.campaign.calibration.sensor_calibration import calibration_of
 from accelstudy.campaign.header import LogLayout
 from accelstudy.campaign.importing.sources import Source
 from accelstudy.effects import HoldConditions
@@ -92,33 +90,6 @@ def test_sigmas_hold_where_the_sensor_loses_gain(plain):
     assert angles[:, 1].std() == pytest.approx(sigma, rel=4 / np.sqrt(2 * 20_000))
     pulls = (angles - attitude) / sigmas
     np.testing.assert_allclose(pulls.std(axis=0), 1, rtol=4.5 / np.sqrt(2 * 20_000))
-
-
-REFUSED = [
-    *((text, "not a calibration.json") for text in ("", "[]", "[" * 100_000)),
-    ({"parameters": 3}, "parameters: must be a list"),
-    ({"redundancy": 0}, "redundancy: must be 1 or more"),
-    ({"redundancy": 10**400}, "redundancy: must be from 0 to 1000000000, not a huge number"),
-    ({"covariance": (-np.eye(9)).tolist()}, "covariance: expected variances above 0"),
-    ({"covariance": (1e250 * np.eye(9)).tolist()}, "covariance.0.0: must be from"),
-    ({"covariance": np.tri(9).tolist()}, "covariance: must be symmetric"),
-    ({"covariance": (1 - 2 * np.eye(9)[::-1]).tolist()}, "covariance: "),
-    ({"parameters": [{"name": "b_x", "value": 1e200}]}, "parameters.0.value: must be from"),
-    ({"ranges": {"fx_mps2": [2, 1]}}, "ranges.fx_mps2: must be the smallest and the largest"),
-]  # fmt: skip
-
-
-@pytest.mark.parametrize(("change", "part"), REFUSED, ids=[row[1] for row in REFUSED])
-def test_what_is_no_calibration_is_one_line(plain, tmp_path, change, part):
-    path = tmp_path / "calibration.json"
-    content = {**plain.content, "sigma_source": "a posteriori"}
-    text = change if isinstance(change, str) else json.dumps({**content, **change})
-    path.write_text(text, encoding="utf-8")
-    with refused(part, start=f"{path}: "):
-        read_calibration(path)
-    for path, said in ((tmp_path / "none.json", "no such file"), (tmp_path, "a folder; give the")):
-        with refused(said):
-            read_calibration(path)
 
 
 # --- Effects that need more than the force -------------------------------------------------------
@@ -352,24 +323,6 @@ def test_parquet_keeps_its_types(plain, tmp_path):
     text = (tmp_path / "out.csv").read_text(encoding="utf-8").splitlines()
     assert text[1].startswith("1,1.5,9,1,1970-01-01 00:00:00.000000000,")
     assert text[2].startswith("2,2.5,9.5,,1970-01-01 00:00:00.000000001,")
-
-
-ONE = "fx,fy,fz\n1,2,-9.6\n"
-BAD = [
-    ("fx,fy,fz\n0.1,0.2,-1\n0.5,0.5,-0.8\n", {},
-     "about 1.05 m/s²: these look like g, not m/s^2; give `unit` g"),
-    ("fx,fy,fz\n" + 2 * "0,0,-30\n" + "1,2,-9\n", {}, "nowhere near gravity"),
-    *((ONE, {"sigma": sigma}, "`sigma`: must be 0, or from 1e-09 to 1000 m/s²")
-      for sigma in (1e300, np.nan)),
-]  # fmt: skip
-
-
-@pytest.mark.parametrize(("content", "options", "part"), BAD)
-def test_a_bad_log_leaves_nothing_behind(plain, log, tmp_path, content, options, part):
-    log.write_text(content, encoding="utf-8")
-    with refused(part):
-        level_log(plain, log, tmp_path / "out.csv", **options)
-    assert [path.name for path in tmp_path.iterdir()] == [log.name]
 
 
 def test_a_lost_sample_does_not_lose_the_log(plain, log, tmp_path):

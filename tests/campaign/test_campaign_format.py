@@ -232,10 +232,6 @@ def always(value):
     return lambda old: [value] * len(old)
 
 
-def times(factor):
-    return lambda old: [float(value) * factor for value in old]
-
-
 def forces(new):
     return dict.fromkeys(("fx", "fy", "fz"), new)
 
@@ -275,83 +271,6 @@ def test_a_wrong_cell_of_any_column_is_said_with_its_place(tmp_path, name):
         with refused(f"{name}: the column is missing", *({*column.names} - {name})):
             read_campaign(tmp_path)
     else:
-        read_campaign(tmp_path)
-
-
-FILES = {
-    "no header": ("campaign.yaml", None, "campaign.yaml", "no such file"),
-    "no table": ("positions.csv", None, "positions.csv", "no such file"),
-    "empty": ("positions.csv", b"", "empty", "position, fx, fy, fz"),
-    "names only": ("positions.csv", b"position,fx,fy,fz\n", "no positions"),
-    "cut": ("positions.csv", b"position,fx,fy,fz\n1,2,3,4\n2,3", "line 3: 2 values for 4 columns"),
-    "no text": ("positions.csv", b"\xff\xfe\x00a", "UTF-8"),
-    "open quote": ("positions.csv", b'position,"fx', "not a whole CSV"),
-    "semicolons": ("positions.csv", b"position;fx;fy;fz\n", "';'", "comma"),
-    "twice": ("positions.csv", b"position,fx,fx\n1,2,3\n", "'fx'", "twice"),
-}
-
-
-@pytest.mark.parametrize(("name", "content", "parts"), [(n, c, p) for n, c, *p in FILES.values()],
-                         ids=FILES)  # fmt: skip
-def test_a_wrong_file_is_one_line(tmp_path, name, content, parts):
-    write_campaign(campaign(), tmp_path)
-    if content is None:
-        (tmp_path / name).unlink()
-    else:
-        (tmp_path / name).write_bytes(content)
-    with refused(str(tmp_path), *parts):
-        read_campaign(tmp_path)
-
-
-def test_a_folder_that_is_none_or_has_another_table(tmp_path):
-    with refused("no such folder", "campaign.yaml and positions.csv"):
-        read_campaign(tmp_path / "none")
-    write_campaign(campaign(), tmp_path)
-    (tmp_path / "positions.csv").rename(tmp_path / "positions.parquet")
-    with refused("positions.csv: no such file; save positions.parquet as CSV"):
-        read_campaign(tmp_path)
-
-
-ONES = {"scale": [0.01] * 3, "offset": [0, 0, 0]}
-ROBOT_COLUMNS = ("roll_robot_gon", "pitch_robot_gon", "yaw_robot_gon")
-BAD = {
-    "unknown key": ({}, {"sensr": "x"}, "sensr: unknown key", "did you mean 'sensor'"),
-    "version": ({}, {"schema_version": 2}, "schema_version", "2 is of a newer version"),
-    "gravity": ({}, {"gravity": {"value_mps2": -9.81}}, "from 0.001 to 1000"),
-    "gravity in g": ({}, {"gravity": {"value_mps2": 1}}, "gravity of 1 m/s²", "campaign.yaml and",
-                     "`gravity`"),
-    "counts alone": ({}, {"unit": "counts"}, "nominal: missing"),
-    "no counts": ({}, {"nominal": ONES},
-                  "nominal: goes with unit: counts, not with unit: m/s^2"),
-    "scale zero": ({}, {"unit": "counts", "nominal": {**ONES, "scale": [1, 0, 1]}},
-                   "nominal.scale.1", "zero"),
-    "other case": ({"fx": None, "Fx": always(1)}, {}, "fx:", "is 'Fx' meant"),
-    "stuck channel": ({"fy": always(1.5)}, {}, "fy: 1.5 in all positions"),
-    "same position": ({"position": at(3, 2)}, {}, "position: position 2: 2 follows"),
-    "time runs back": ({"time_s": at(4, 15)}, {}, "time_s: position 4: 15 is before"),
-    "yaw only": ({"pitch_robot_gon": None, "roll_robot_gon": None}, {"robot": None},
-                 "positions.csv: yaw_robot_gon: goes with roll_robot_gon and pitch_robot_gon"),
-    "no sigma": ({}, {"robot": None}, "robot.angle_sigma_mgon: missing"),
-    "no robot": (dict.fromkeys(ROBOT_COLUMNS), {},
-                 "robot.angle_sigma_mgon: is given, but positions.csv has no roll_robot_gon"),
-    "degrees": (dict.fromkeys(ROBOT_COLUMNS[:2], times(0.9)), {},
-                "the robot's angles are in degrees, not in gon"),
-    "opposite sign": (forces(times(-1)), {}, "axes have the wrong sign", "(0, 0, −g)"),
-    "g for m/s^2": (forces(times(1 / G)), {}, "about 1 m/s²", "look like g, not m/s^2"),
-    "m/s^2 for g": ({}, {"unit": "g"}, "look like m/s^2, not g", "campaign.yaml and"),
-    "wrong nominal": (forces(times(400)), {"unit": "counts", "nominal": ONES},
-                      "positions.csv: ", "nowhere near gravity", "`scale`"),
-    "no unit fits": (forces(times(0.3)), {}, "nowhere near gravity, 9.81 m/s²"),
-    "no force": (forces(times(1e-300)), {}, "their norm is about "),
-    "huge cell": ({"fy": at(3, 1e11)}, {}, "fx, fy, fz: position 3: more than 1000 times"),
-}  # fmt: skip
-
-
-@pytest.mark.parametrize(("columns", "keys", "parts"), [(c, k, p) for c, k, *p in BAD.values()],
-                         ids=BAD)  # fmt: skip
-def test_what_cannot_be_right_is_one_line_that_says_where(tmp_path, columns, keys, parts):
-    changed(tmp_path, columns, **keys)
-    with refused(str(tmp_path), *parts):
         read_campaign(tmp_path)
 
 

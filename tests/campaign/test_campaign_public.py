@@ -6,7 +6,7 @@ import threading
 from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
 
 import pytest
-from calling import refusal, refused, succeed
+from calling import refused, succeed
 from places import DATA, needs_data
 
 from accelstudy.campaign.format import read_campaign
@@ -98,15 +98,6 @@ def test_command(tmp_path):
     assert "holds: 10" in result.output
     assert read_campaign(tmp_path / "out").sensor == "MPU-6050"
     assert (tmp_path / "out" / "segmentation.png").exists()
-
-
-@pytest.mark.parametrize(("arguments", "message"), [
-    (["xsens", "--out", "out"], "unknown public data 'xsens'; did you mean 'xsens-mti'?"),
-    (["ferraris-sections", "--out", "out"], "'ferraris-sections' hold no forces"),
-    (["xsens-mti"], "--out: give the folder for xsens-mti"),
-])  # fmt: skip
-def test_command_refuses(arguments, message):
-    assert message in refusal("public", *arguments)
 
 
 def test_a_file_that_is_there_is_not_downloaded(tmp_path, fetch):

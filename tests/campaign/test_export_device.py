@@ -10,7 +10,7 @@ from functools import cache
 
 import numpy as np
 import pytest
-from calling import refusal, refused, succeed
+from calling import refused, succeed
 
 import accelstudy as acs
 from accelstudy.campaign.calibration.c_code import c_header
@@ -281,15 +281,6 @@ def test_what_no_device_knows_is_refused(form, spec, what):
     effect = get_effect(spec).name
     with refused(f"{effect} depends on the {what}, which no device knows"):
         export(calibration_with((spec,)), form)
-
-
-@pytest.mark.parametrize(("words", "says"), [
-    (("--form", "c", "--level"), "--level: no longer an option; roll = atan2(-f_y, -f_z) and pi"),
-    (("--form", "json"), "form json: no longer a form; calibration.json has the parameters"),
-    (("--form", "ros"), "form ros: no longer a form; `--form matrix` has the numbers of imu_calib"),
-])  # fmt: skip
-def test_what_was_an_option_says_what_to_write_instead(words, says, tmp_path):
-    assert says in refusal("export", written(tmp_path, NINE), *words)
 
 
 INJECTED = "x\n1\t1\tCAL_ACC0_XOFF\t9\t9\x1b[31m\u2028*/"

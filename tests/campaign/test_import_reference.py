@@ -5,7 +5,7 @@ import json
 import numpy as np
 import pandas as pd
 import pytest
-from calling import refusal, refused
+from calling import refused
 
 import accelstudy as acs
 
@@ -147,21 +147,6 @@ def test_calibrations_that_tell_no_angles(plate, tmp_path):
         path.write_text(json.dumps({**content, **change}))
         with refused(*parts):
             imported(plate, "ref.csv", path)
-
-
-@pytest.mark.parametrize(("words", "part"), [
-    ("--reference-log LOG", "--reference-log: give the calibration.json"),
-    ("--reference FILE", "--reference: give the raw log"),
-    ("--reference-offset 3", "--reference-offset: goes with --reference-log"),
-    ("BOTH --means", "--means"),
-    ("BOTH --robot-sigma 3mgon", "--robot-sigma"),
-    ("BOTH --reference-columns fx=ax,fw=az", "--reference-columns: fw"),
-])  # fmt: skip
-def test_options_that_do_not_go_together(plate, tmp_path, words, part):
-    words = words.replace("BOTH", "--reference-log LOG --reference FILE")
-    words = words.replace("LOG", f"{plate}/ref.csv")
-    words = words.replace("FILE", f"{plate}/ref/calibration.json").split()
-    assert part in refusal("import", plate / "log.csv", "--out", tmp_path / "c", *words)
 
 
 def test_angles_in_the_log_are_not_used(plate):

@@ -9,7 +9,7 @@ import numpy as np
 import pandas as pd
 import pytest
 import yaml
-from calling import call, refusal, succeed
+from calling import call, succeed
 from click.testing import CliRunner
 from study_helpers import NINE, PROVENANCE, content, grid
 
@@ -140,15 +140,6 @@ def test_angles_in_degrees(monkeypatch):
     assert output("schemes", "mclaren-24", "--angle-unit", "gon") == gon
 
 
-def test_an_unknown_angle_unit(monkeypatch):
-    line = "error: unknown angle unit 'grad' (known: gon, deg)\n"
-    monkeypatch.delenv("ACCELSTUDY_ANGLE_UNIT", raising=False)
-    for arguments in (["--angle-unit", "grad", "models"], ["effects", "--angle-unit", "grad"]):
-        assert refusal(*arguments) == line
-    monkeypatch.setenv("ACCELSTUDY_ANGLE_UNIT", "grad")
-    assert refusal("models") == line
-
-
 # --- a study -------------------------------------------------------------------------------------
 
 
@@ -181,17 +172,6 @@ def test_claims(tmp_path):
 
 
 # --- bad input -----------------------------------------------------------------------------------
-
-
-@pytest.mark.parametrize(("arguments", "expected"), [
-    (["scheme", "mclaren-42"], "unknown scheme 'mclaren-42'"),
-    (["scheme", "../etc"], "../etc: no such file"),
-    (["schemes", "--model", "bias-scales"], "did you mean 'bias-scale'?"),
-    (["schemes", "--approach", "robots"], "did you mean 'robot'?"),
-    (["cells", "/nowhere/study.yaml"], "/nowhere/study.yaml: no such file"),
-])  # fmt: skip
-def test_unknown_names_and_files(arguments, expected):
-    assert expected in refusal(*arguments)
 
 
 def test_a_defect_is_not_taken_for_bad_input(monkeypatch):

@@ -13,7 +13,6 @@ from scipy.spatial.transform import Rotation
 
 from accelstudy.schemes import (
     Scheme,
-    UnknownSchemeError,
     get_scheme,
     register,
     registry,
@@ -83,24 +82,6 @@ def test_a_scheme_is_what_its_name_says(name):
     assert found.source
     assert found.status in {"exact", "standard", "stand-in", "generated"}
     np.testing.assert_allclose(np.linalg.norm(found.directions, axis=1), 1, rtol=1e-14)
-
-
-@pytest.mark.parametrize(("name", "close"), [
-    ("McLaren-24", "mclaren-24"),
-    ("face-6", "faces-6"),
-    ("fibonacci-0", "fibonacci-50"),
-    ("fibonacci-024", "fibonacci-24"),
-    ("randm-20-7", "random-20-7"),
-    ("zzz", None),
-])  # fmt: skip
-def test_unknown_names_are_answered_with_the_valid_ones(name, close):
-    with pytest.raises(UnknownSchemeError) as error:
-        get_scheme(name)
-    message = str(error.value)
-    assert f"unknown scheme {name!r}" in message
-    assert f". Did you mean {close!r}?" in message if close else "Did you mean" not in message
-    for known in (*scheme_names(), *scheme_families()):
-        assert known in message
 
 
 def test_a_registered_scheme_is_found_by_its_name_and_its_family(monkeypatch):

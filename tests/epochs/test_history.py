@@ -4,7 +4,7 @@ import json
 
 import numpy as np
 import pytest
-from calling import refusal, succeed
+from calling import succeed
 from page_helpers import assert_sound
 from session_helpers import SENSOR, write_document
 
@@ -168,31 +168,6 @@ def test_the_command_writes_what_it_says(per_year, tmp_path):
     assert (out / "figures/history.svg").is_file()
 
 
-def test_bad_input_ends_in_one_line(tmp_path):
-    paths = [tmp_path / f"{k}.json" for k in range(3)]
-    for k, path in enumerate(paths):
-        write_document(path, k + 1)
-    copy = tmp_path / "copy.json"
-    copy.write_bytes(paths[0].read_bytes())
-    other = tmp_path / "other.json"
-    write_document(other, 4, model="quadratic_scale", scheme="fibonacci-30")
-    for given, said in (
-        (paths, f"{paths[0]}: date: missing; give --date"),
-        (arguments(paths, YEARS[:2]), "--date: 2 dates for 3 calibrations"),
-        (arguments(paths[:2], YEARS[:2]), "CALIBRATION: a history has 3 or more, not 2"),
-        (arguments(paths, ["2023-01-01"] * 3), "--date: all are the same"),
-        (arguments(paths, [*YEARS[:2], "1.2.2023"]), "--date: '1.2.2023' is no date"),
-        (arguments(paths, [*YEARS[:2], "0202-01-01"]), "--date: 0202-01-01: the year must be"),
-        ([*arguments(paths, YEARS[:3]), "--confidence=rms"], "--confidence: expected a number"),
-        (arguments([*paths[:2], paths[0]], YEARS[:3]), f"{paths[0]}: is given twice"),
-        (arguments([*paths[:2], copy], YEARS[:3]), f"{copy}: has the numbers of {paths[0]}"),
-        (arguments([*paths, other], YEARS[:4]), "calibration 4 (session-4): effects: quadratic"),
-    ):
-        line = refusal("history", *given, "--out", tmp_path / "out")
-        assert line.startswith(f"error: {said}")
-    assert not (tmp_path / "out").exists()
-
-
 def test_dates_come_from_the_campaigns(tmp_path):
     """Of a header, by the calibration, to the history."""
     calibrations = []
@@ -205,6 +180,3 @@ def test_dates_come_from_the_campaigns(tmp_path):
         calibrations.append(acs.calibrate(folder, model="bias", approach="gravity"))
     content = acs.history(calibrations).content
     assert [c["date"][:10] for c in content["calibrations"]] == list(YEARS[:3])
-    header = folder / "campaign.yaml"
-    header.write_text(header.read_text(encoding="utf-8").replace(date, "spring"), encoding="utf-8")
-    assert "date: 'spring' is no date" in refusal("calibrate", folder, "--out", tmp_path / "c")

@@ -39,6 +39,14 @@ def test_no_command_of_a_page_fails_and_no_picture_is_old():
             assert "not as its tutorial shows it" not in text, f"{part}/{name}; `make pictures`"
 
 
+def test_what_is_refused_is_one_line_and_nothing_is_written():
+    text = "".join(kept_of("refusals").values())
+    answers = re.split(r"^(?:=== |accelstudy (?!.*…)).*\n", text, flags=re.M)[1:]
+    assert len(answers) > 300
+    line = r"! error: .*\n+(accelstudy .*\n)?"  # and the command of the next ones
+    assert [said for said in answers if not re.fullmatch(line, said)] == []
+
+
 def test_each_help_has_an_example():
     texts = kept_of("help")
     assert texts.keys() == {"accelstudy", *main.commands}

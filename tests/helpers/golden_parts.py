@@ -11,6 +11,7 @@ import pandas as pd
 import yaml
 from example_helpers import EXAMPLES, FIGURES, SHOWN
 from places import DATA, ROOT
+from refusals import texts as refusals
 from transcript import Shell, commands_of_page, commands_of_script, rows_text, table_text
 
 Texts = Iterator[tuple[str, str]]
@@ -306,6 +307,7 @@ PARTS: dict[str, Callable[[Path], Texts]] = {
     **{part: partial(pages, part=part) for part in PAGES},
     "quiet": partial(script, name="quiet", files=False),
     "degrees": partial(script, name="degrees", ACCELSTUDY_ANGLE_UNIT="deg"),
+    "refusals": refusals,
     "advise": advise,
     "lots": lots,
     "logs": logs,
@@ -315,5 +317,5 @@ PARTS: dict[str, Callable[[Path], Texts]] = {
 """Those that take longest first."""
 OF_DATA = ("logs", "real-data")
 """Parts that need the public measurements."""
-QUICK = ("readme", "help", "real-data")
+QUICK = ("readme", "refusals", "help", "real-data")
 """Parts that `make test` compares, too."""

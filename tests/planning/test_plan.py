@@ -454,17 +454,3 @@ def test_an_unreachable_target_has_an_exit_status_of_its_own():
     assert result.exit_code == 1
     assert result.stdout.count("\n") == 1
     assert result.stderr == "comparing calibrations, which takes some seconds ...\n"
-
-
-@pytest.mark.parametrize(("words", "message"), [
-    (("--tilt-accuracy", "10mgon"), "give the sensor by --sensor, or its noise by --sigma"),
-    (("--tilt-accuracy", "10mgon", "--sensor", "paper", "--sigma", "2mm/s2"), "not both"),
-    (("--tilt-accuracy", "10mgon", "--sensor", "adxl35"), "did you mean 'adxl355'"),
-    (("--tilt-accuracy", "10mgon", "--sensor", "no.yaml"), "no.yaml: no such file"),
-    (("--tilt-accuracy", "10mgon", "--sigma", "2mm/s2", "--tilt-range", "95gon"), "at most 90"),
-    (("--tilt-accuracy", "10mgon", "--sigma", "2mm/s2", "--confidence", "120%"),
-     "--confidence: must be rms, or a share"),
-    (("--tilt-accuracy", "10mgon", "--sigma", "2mm/s2", "--equipment", "crane"), "crane"),
-])  # fmt: skip
-def test_bad_input_ends_with_exit_status_2(words, message):
-    assert message in refusal("plan", *words)

@@ -50,21 +50,6 @@ def parameters(path):
     return {p["name"]: (p["value"], p["sigma"]) for p in document["parameters"]}
 
 
-@pytest.mark.parametrize(("arguments", "words"), [
-    (["calibrate", "c", "--out", "no"], "no vibration_mps2"),
-    (["diagnose", "c", "--out", "no"], "no vibration_mps2"),
-    (["effects", "--campaign", "c"], "no vibration_mps2"),
-    (["schemes", "mclaren-24"], "which a scheme does not give"),
-    (["simulate-campaign", "--out", "no"], "vibration: missing"),
-])  # fmt: skip
-def test_what_cannot_feed_a_model_says_so_in_one_line(arguments, words, made, monkeypatch):
-    monkeypatch.chdir(made)
-    text = refusal(*arguments, "--model", "bias-scale+vibration_rectification")
-    assert "'vibration_rectification'" in text
-    assert words in text
-    assert not (made / "no").exists()
-
-
 # --- what a diagnosis found, used the next day ----------------------------------------------------
 
 

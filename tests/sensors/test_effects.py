@@ -6,7 +6,6 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from calling import refused
 from scipy.spatial.transform import Rotation
 from usual import GRAVITY, ROBOT, G
 
@@ -17,7 +16,6 @@ from accelstudy.effects import HoldConditions, TemperatureCourse, effect_names, 
 from accelstudy.effects.hold_conditions import MIN_STEP
 from accelstudy.effects.saturation import ROUND_WIDTH
 from accelstudy.leveling.angles import roll_pitch, specific_force
-from accelstudy.noise_effects import get_noise_effect
 from accelstudy.schemes import get_scheme
 from accelstudy.sensors.sensor import SensorModel
 from accelstudy.simulation.sessions import Noise, session
@@ -306,24 +304,6 @@ def test_candidates_fit_the_session():
 def test_candidates_need_the_time(name):
     with pytest.raises(InputError, match="needs the column 'time' of each position; it is absent"):
         get_effect(name).candidates(HoldConditions(), FORCES, G)
-
-
-@pytest.mark.parametrize(("spec", "expected"), [
-    ("warmup", "unknown effect 'warmup'; did you mean 'warm_up'?"),
-    ("warm_up(t=3)", "unknown setting of the effect 'warm_up' 't' (known: tau)"),
-    ("warm_up(tau=ten)", "'tau=ten' is no setting"),
-    ("warm_up(tau=0)", "effect 'warm_up': tau=0 must be a number above 0"),
-    ("thermal_bias(tau=-1)", "tau=-1 must be a number above 0, or 0"),
-    ("bias_jump(t=inf)", "t=inf must be a number that is finite"),
-    ("warm_up(tau=1", "unknown effect"),
-    ("heavy_tails(nu=2)", "noise effect 'heavy_tails': nu=2 must be a number above 2"),
-    ("coloured_noise(share=1)", "share=1 must be a number above 0 and below 1"),
-])  # fmt: skip
-def test_what_is_wrong_with_a_spec(spec, expected):
-    """Of an effect, or of a noise effect."""
-    get = get_noise_effect if spec.startswith(("heavy", "coloured", "quant")) else get_effect
-    with refused(expected):
-        get(spec)
 
 
 # --- estimation ----------------------------------------------------------------------------------

@@ -5,7 +5,6 @@ from itertools import permutations, product
 import numpy as np
 import pytest
 
-from accelstudy.basics.errors import InputError
 from accelstudy.sensors.frames import FRD, parse_frame
 
 POINTS = {"f": [1, 0, 0], "r": [0, 1, 0], "d": [0, 0, 1]}
@@ -39,15 +38,3 @@ def test_well_known_frames():
     np.testing.assert_array_equal(parse_frame("flu").signs, [1, -1, -1])
     np.testing.assert_array_equal(parse_frame("rfu").signs, [1, 1, -1])
     np.testing.assert_array_equal(parse_frame("rfu").to_frd_order(np.array([1, 2, 3])), [2, 1, 3])
-
-
-@pytest.mark.parametrize(("name", "message"), [
-    ("fru", "is left-handed; with x and y like this z must point the other way: frd"),
-    ("ff", "expected three letters"),
-    ("frb", "expected three letters"),
-    ("ned", "expected three letters"),
-    ("", "expected three letters"),
-])  # fmt: skip
-def test_no_frames(name, message):
-    with pytest.raises(InputError, match=message):
-        parse_frame(name)

@@ -263,24 +263,6 @@ def test_a_calibration_of_before_saves_positions(begun, sessions, tmp_path):
 # --- bad input -----------------------------------------------------------------------------------
 
 
-def test_bad_input_ends_with_a_line(begun, tmp_path):
-    folder = begun(5)
-    assert "no such folder; a running session" in error(tmp_path / "nowhere", *WANTED)
-    assert "--tilt-accuracy: expected a number with its unit" in error(
-        folder, "--tilt-accuracy", "10"
-    )
-    no_robot = error(folder, *WANTED, "--approach", "robot")
-    assert "needs the columns roll_robot_gon and pitch_robot_gon" in no_robot
-    assert "needs the block `robot`" in error(begun(0), *WANTED, "--approach", "robot")
-    folder = begun(5)
-    blind = error(folder, *WANTED, "--model", f"{MODEL}-crossaxis")
-    assert "cannot determine the model" in blind
-    assert "needs the temperature" in error(folder, *WANTED, "--model", f"{MODEL}+thermal_bias")
-    assert "unknown set of attitudes 'cubes'" in error(folder, *WANTED, "--attitudes", "cubes")
-    (folder / "positions.csv").write_text("position,fx,fy,fz\n1,0,x,-9.8\n", encoding="utf-8")
-    assert "positions.csv: fy: position 1: 'x' is no number" in error(folder, *WANTED)
-
-
 def test_a_last_line_without_an_end(begun):
     folder = begun(5)
     table = folder / "positions.csv"

@@ -5,7 +5,7 @@ import math
 
 import pytest
 import yaml
-from calling import call, refusal, refused
+from calling import call
 from places import ROOT
 from snakemake.exceptions import WorkflowError
 from snakemake.utils import validate
@@ -99,59 +99,6 @@ def test_config_yaml_has_every_top_level_key():
 # --- bad input: what any file may have, tests/basics have -----------------------------------------
 
 SENSITIVITY = {"roll_gon": [0, 50], "pitch_gon": [0, 50], "base_samples": 16, "resamples": 5}
-PAPER = {"paper": True, "sensitivity": SENSITIVITY}
-
-BAD = {
-    "unknown key": ({"seeed": 1}, "seeed: unknown key; did you mean 'seed'? (known: plugins, st"),
-    "name": ({"study": "../elsewhere\n"}, "study", "'../elsewhere"),
-    "unknown model": ({"grids": [grid(models="bias-scales")]},
-                      "grids.0.models: unknown model 'bias-scales'; did you mean 'bias-scale'?"),
-    "effect twice in a model": ({"models": {"mine": ["bias", "bias"]}},
-                              "models.mine: parameters b_x, b_y, b_z occur in two effects"),
-    "model of a taken name": ({"models": {"bias-scale": ["bias"]}}, "models.bias-scale"),
-    "unknown effect": ({"sensor": {"bais": {"value": [1, 2, 3], "unit": "g"}}},
-                       "sensor.bais: unknown effect 'bais'; did you mean 'bias'?"),
-    "unit of another quantity": ({"sensor": {"scale": {"value": [1, 2, 3], "unit": "mgon"}}},
-                                 "sensor.scale", "ppm"),
-    "too few values": ({"sensor": {"scale": {"value": [1, 2], "unit": "ppm"}}},
-                       "sensor.scale: value: 2 numbers", "s_x, s_y, s_z"),
-    "no replicates": ({"grids": [grid(replicates=0)]}, "grids.0.replicates",
-                      "from 1 to 1000000"),
-    "huge text": ({"models": {"m": ["a" * 10**5]}}, "models.m: unknown effect 'aaa"),
-    "a key of an earlier version": ({"keep": "summary"}, "keep: no longer a key", "leave it out"),
-    "no cells": ({"grids": []}, "neither grids nor presets"),
-    "base samples": ({"sensitivity": {**SENSITIVITY, "base_samples": 1000}},
-                     "sensitivity.base_samples: must be a power of two"),
-    "paper without sensitivity": ({"paper": True}, "paper: true needs", "`sensitivity`"),
-    "no robot's cell": ({**PAPER, "grids": [grid(approaches="gravity")]},
-                        "sensitivity: needs", f"{NINE}/mclaren-24/robot", "`grids`"),
-    "another noise": ({"sensitivity": SENSITIVITY, "grids": [grid(sensor_sigma_mps2=0.001)]},
-                      f"{NINE}/mclaren-24/gravity"),
-    "one replicate": ({"sensitivity": SENSITIVITY, "grids": [grid(replicates=1)]},
-                      "at least 2 replicates"),
-    "no estimates": ({"sensitivity": {**SENSITIVITY, "scheme": "faces-6"},
-                      "grids": [grid(schemes="faces-6")]},
-                     f"{NINE}/faces-6/gravity cannot be estimated: rank 6 of 9"),
-    "no redundancy": ({"paper": True, "sensitivity": {**SENSITIVITY, "scheme": "d-optimal-9"},
-                       "grids": [grid(schemes="d-optimal-9")]},
-                      f"{NINE}/d-optimal-9/gravity has no redundancy"),
-    "small model": ({"paper": True, "sensitivity": {**SENSITIVITY, "model": "bias-scale"},
-                     "grids": [grid(models="bias-scale")]},
-                    "sensitivity.model", "lacks nonorthogonality"),
-    "paper without the level": ({"paper": True, "sensitivity": {**SENSITIVITY, "pitch_gon": [10]}},
-                                "sensitivity.pitch_gon: must contain 0"),
-}  # fmt: skip
-
-
-@pytest.mark.parametrize(("changes", "expected"), [(c, e) for c, *e in BAD.values()], ids=[*BAD])
-def test_bad_content(changes, expected, tmp_path):
-    """By the function, and by the command line."""
-    path = tmp_path / "study.yaml"
-    path.write_text(yaml.safe_dump(content(**changes)))
-    with refused(*expected, start=f"{path}: ") as caught:
-        read_study(path)
-    assert refusal("cells", path) == f"error: {caught.value}\n"
-    assert len(str(caught.value)) < len(str(path)) + 700
 
 
 def test_overlaid_files_are_all_named(tmp_path):
