@@ -23,7 +23,6 @@ from typing import Any
 
 from accelstudy.basics.errors import InputError
 from accelstudy.basics.names import check_file_name
-from accelstudy.basics.progress import warn
 
 PREFIX = "accelstudy."
 """What the groups of entry points begin with; the name of a room follows."""
@@ -32,7 +31,6 @@ HOW = "; of a plug-in: name its file with --plugin or, in a configuration, under
 """What a message adds to the names that are known."""
 _CODE = (".py", ".yaml", ".yml", ".json", ".j2")
 
-_warn_once = cache(warn)
 _files: dict[str, str] = {}
 """Digest by name, of the files that are loaded."""
 _loading: list[str] = []
@@ -67,15 +65,11 @@ def load_files(paths: Iterable[str | Path]) -> None:
 
 
 def load_plugins(content: Mapping[str, Any]) -> None:
-    """Load the plug-ins that a configuration names; raises errors like `load_files`.
-
-    What is no list of texts, the schema of the configuration refuses.
-    """
+    """Load the plug-ins that a configuration names; raises errors like `load_files`."""
     try:
-        load_files(_named_plugins(content))
+        load_files(_named(content))
     except InputError as error:
         raise InputError(f"plugins: {error}") from None
-    _missing(content, "the configuration")
 
 
 @contextmanager
@@ -87,41 +81,25 @@ def explain_missing(content: Mapping[str, Any], source: str | Path) -> Iterator[
     InputError
         Of what is read; it says which plug-ins are named and not loaded.
     """
-    missing = ", ".join(_missing(content, source)[:3])
     try:
         yield
     except InputError as error:
+        loaded = {Path(name).name for name in _files}
+        missing = [name for name in _named(content) if Path(name).name not in loaded]
         if not missing:
             raise
         raise InputError(
-            f"{error}; {source} needs the plug-in {missing}, and a file of data loads "
-            "no code: if you trust that plug-in, give it with --plugin"
+            f"{error}; {source} needs the plug-in {', '.join(missing[:3])}, and a file of data "
+            "loads no code: if you trust that plug-in, give it with --plugin"
         ) from None
 
 
-def _named_plugins(content: Mapping[str, Any]) -> dict[str, Any]:
-    """Plug-ins that a file names, with the digest of each or None."""
-    named = content.get("plugins") or {}
+def _named(content: Mapping[str, Any]) -> list[str]:
+    """Plug-ins that a file names; what is no text is none, and the schema refuses it."""
+    named = content.get("plugins") or ()
     named = [named] if isinstance(named, str) else named
-    if isinstance(named, list | tuple):
-        named = dict.fromkeys(filter(lambda name: isinstance(name, str), named))
-    return {str(k): v for k, v in named.items()} if isinstance(named, Mapping) else {}
-
-
-def _missing(content: Mapping[str, Any], source: str | Path) -> list[str]:
-    """Plug-ins that are named and not loaded; warn of one that is loaded but is another now."""
-    missing = []
-    loaded = {Path(name).name: digest for name, digest in _files.items()}
-    for name, digest in _named_plugins(content).items():
-        there = loaded.get(Path(name).name)
-        if there is None and digest not in loaded.values():
-            missing.append(name if digest is None else f"{name} (digest {digest})")
-        elif digest is not None and digest not in loaded.values():
-            _warn_once(
-                f"{source}: was written with another {name} than is loaded: its digest was "
-                f"{digest}, and is {there} now"
-            )
-    return missing
+    listed = isinstance(named, list | tuple | Mapping)  # 0.2 wrote a digest beside each name
+    return [name for name in named if isinstance(name, str)] if listed else []
 
 
 def _load_file(path: Path) -> None:
@@ -154,14 +132,8 @@ def loaded_files() -> list[str]:
 
 
 def file_key() -> dict[str, Any]:
-    """Key of a file that names the loaded files with their digests; empty without any."""
-    return {"plugins": dict(_files)} if _files else {}
-
-
-def provenance() -> dict[str, Any]:
-    """Digests of all plug-ins as part of a provenance; empty without any."""
-    found = digests()
-    return {"plugins": found} if found else {}
+    """Key of a file that names the files that are loaded; empty without any."""
+    return {"plugins": loaded_files()} if _files else {}
 
 
 def load_installed(room: str) -> None:

@@ -32,7 +32,7 @@ from accelstudy.campaign.calibration.result import Calibration
 from accelstudy.campaign.format import read_campaign
 from accelstudy.campaign.session import Campaign
 from accelstudy.files.outputs import BATCH
-from accelstudy.files.parquet import write_frame
+from accelstudy.files.tables import write_table
 from accelstudy.pages import write_page
 from accelstudy.pages.result import Result
 from accelstudy.sensors.sensor import SensorModel
@@ -191,7 +191,7 @@ class Batch(Result):
         for name, calibration in self.calibrations.items():
             (own := folder / EACH / name).mkdir(parents=True)
             calibration.write(own, place / EACH / name)
-        write_frame(folder / "parameters.parquet", self.parameters)
+        write_table(folder / "parameters.parquet", self.parameters)
         of_state = {state: [r for r in self._rows if r["state"] == state] for state in STATES}
         calibrated = [r for r in self._rows if r["state"] not in (FAILED, IMPLAUSIBLE)]
         write_page(
@@ -206,7 +206,7 @@ class Batch(Result):
             blind=BLIND,
             next_steps=[*self._next_steps(place)],
         )
-        write_frame(folder / "campaigns.parquet", self.to_frame())
+        write_table(folder / "campaigns.parquet", self.to_frame())
 
     def _next_steps(self, place: Path) -> Iterator[tuple[str, str]]:
         """What to do with the first good campaign, and with the first doubtful one."""

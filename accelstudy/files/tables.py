@@ -1,4 +1,4 @@
-"""Parquet files with their provenance in the metadata, written whole or not at all."""
+"""Parquet files: written whole or not at all, with their origin, and refused if damaged."""
 
 from __future__ import annotations
 
@@ -18,12 +18,10 @@ from accelstudy import __version__
 from accelstudy.basics import plugins
 from accelstudy.basics.errors import InputError
 from accelstudy.files.outputs import whole_file
-from accelstudy.files.parquet import whole_parquet, write_parquet
+from accelstudy.files.reading import readable
 
-if (
-    TYPE_CHECKING
-):  # otherwise imported where it is needed: it is slow, and jobs that simulate do not need it
-    import pandas as pd
+if TYPE_CHECKING:
+    import pandas as pd  # slow, and jobs that simulate do not need it
 
 METADATA_KEY = b"accelstudy"
 
@@ -67,7 +65,7 @@ def origin(provenance: Mapping[str, Any]) -> dict[str, Any]:
         "version": __version__,
         "commit": git_commit(),
         **{name: _version(name) for name in LIBRARIES},
-        **plugins.provenance(),
+        **({"plugins": found} if (found := plugins.digests()) else {}),
     }
 
 
@@ -80,14 +78,24 @@ def _version(name: str) -> str | None:
         return None
 
 
+def write_table(
+    path: str | Path, table: pd.DataFrame | pa.Table, provenance: Mapping[str, Any] | None = None
+) -> None:
+    """Write a table without its index, with its `origin` where a provenance is given."""
+    if not isinstance(table, pa.Table):
+        table = pa.Table.from_pandas(table, preserve_index=False)
+    with table_writer(path, table.schema, provenance) as write:
+        write(table)
+
+
 @contextmanager
-def parquet_writer(
+def table_writer(
     path: str | Path,
     schema: pa.Schema,
-    provenance: Mapping[str, Any],
+    provenance: Mapping[str, Any] | None = None,
     measured: Sequence[str] = (),
 ) -> Iterator[Callable[[pa.Table], None]]:
-    """Write tables of one schema into one file, a row group each.
+    """Write tables of one schema into one file, a row group each, with checksums of the pages.
 
     `measured` names columns of floats that hardly repeat. They are packed byte by byte, which is
     smaller and faster than a search for repetitions. Of numbers that count up the steps are stored,
@@ -95,12 +103,14 @@ def parquet_writer(
     """
     counting = [f.name for f in schema if pa.types.is_int64(f.type)]
     floats = [f.name for f in schema if pa.types.is_floating(f.type)]
-    metadata = {METADATA_KEY: json.dumps(origin(provenance)).encode()}
+    if provenance is not None:
+        made = {METADATA_KEY: json.dumps(origin(provenance))}
+        schema = schema.with_metadata({**(schema.metadata or {}), **made})
     with (
         whole_file(path) as temporary,
         pq.ParquetWriter(
             temporary,
-            schema.with_metadata(metadata),
+            schema,
             write_page_checksum=True,
             compression="lz4",
             use_dictionary=[name for name in schema.names if name not in (*counting, *floats)],
@@ -111,12 +121,28 @@ def parquet_writer(
         yield writer.write_table
 
 
-def write_table(path: str | Path, table: pd.DataFrame, provenance: Mapping[str, Any]) -> None:
-    """Write a table with its origin."""
-    content = pa.Table.from_pandas(table, preserve_index=False)
-    metadata = {**(content.schema.metadata or {}), METADATA_KEY: json.dumps(origin(provenance))}
-    with whole_file(path) as temporary:
-        write_parquet(temporary, content.replace_schema_metadata(metadata), compression="zstd")
+@contextmanager
+def open_parquet(path: str | Path, remedy: str = "") -> Iterator[pq.ParquetFile]:
+    """Open a file whose pages are verified when they are read.
+
+    Raises
+    ------
+    InputError
+        If the file is missing, is no whole Parquet file, or a page is not what was written; the
+        message ends with the remedy.
+    """
+    try:
+        with readable(path):
+            with Path(path).open("rb") as file:  # Arrow's errors do not say that it is the disk
+                file.read(1)
+            with pq.ParquetFile(path, page_checksum_verification=True) as file:
+                yield file
+    except InputError:
+        raise
+    except (pa.ArrowException, OSError, ValueError, LookupError, OverflowError) as error:
+        reason = (str(error).splitlines() or [type(error).__name__])[0][:100]
+        end = f"; {remedy}" if remedy else ""
+        raise InputError(f"{path}: not a whole Parquet file ({reason}){end}") from None
 
 
 def read_table(
@@ -143,18 +169,13 @@ def read_table(
         return pd.concat([read_table(each, columns) for each in path], ignore_index=True)
     path = Path(path)
     if path.is_dir():
-        paths = tables_in(path)
-        if not paths:
+        found = {each.relative_to(path): each for each in path.rglob("*.parquet")}
+        names = [name for name in sorted(found) if not any(part[0] == "." for part in name.parts)]
+        if not names:  # what is being written is in folders whose names begin with a dot
             raise InputError(f"{path}: holds no tables")
-        return read_table(paths, columns)
-    with whole_parquet(path, REMEDY) as file:
+        return read_table([found[name] for name in names], columns)
+    with open_parquet(path, REMEDY) as file:
         return file.read(columns).to_pandas()
-
-
-def tables_in(folder: Path) -> list[Path]:
-    """Tables in a folder and the folders below it, without those that are being written."""
-    paths = {path.relative_to(folder): path for path in folder.rglob("*.parquet")}
-    return [paths[name] for name in sorted(paths) if not any(p[0] == "." for p in name.parts)]
 
 
 def _check_seeds(paths: Iterable[str | Path]) -> None:
@@ -178,7 +199,7 @@ def read_origin(path: str | Path) -> dict[str, Any]:
     InputError
         If the file is missing, is not whole, or was not written by this package.
     """
-    with whole_parquet(path, REMEDY) as file:
+    with open_parquet(path, REMEDY) as file:
         origin_of_file = json.loads((file.schema_arrow.metadata or {}).get(METADATA_KEY, b"{}"))
     if not isinstance(origin_of_file, dict) or not {"config_hash", "seed"} <= origin_of_file.keys():
         raise InputError(f"{path}: does not say where it comes from; it is no table of a study")

@@ -45,7 +45,7 @@ def new_study(folder: Path, force: bool = False) -> str:
             text = (TEMPLATE / source).read_text(encoding="utf-8")
             (new / target).write_text(text.replace("NAME", name), encoding="utf-8")
         if named := file_key():  # the workflow runs in the new folder
-            named = {k: {os.path.abspath(p): d for p, d in v.items()} for k, v in named.items()}
+            named = {key: [*map(os.path.abspath, files)] for key, files in named.items()}
             with (new / "config" / "config.yaml").open("a", encoding="utf-8") as file:
                 file.write(f"\n{yaml.safe_dump(named)}")
         shutil.copytree(shipped("profiles"), new / "profiles")

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from accelstudy.basics.errors import InputError
 from accelstudy.basics.shares import Z95, sigmas_95, wilson
 from accelstudy.basics.units import GON, MGON, recorded_unit, to_recorded
-from accelstudy.files.tables import parquet_writer, read_table, write_table
+from accelstudy.files.tables import read_table, table_writer, write_table
 from accelstudy.study.cell import Cell
 from accelstudy.study.estimate import UNKNOWN, Estimates
 from accelstudy.study.replicates import ESTIMATES, Replicates, estimates_table
@@ -78,7 +78,7 @@ def simulate_cells(
     provenance : see `accelstudy.files.tables.origin`; its seed is that of the study
     """
     measured = ("estimate", "linear_estimate", "sigma_priori")
-    with parquet_writer(outputs["estimates"], ESTIMATES, provenance, measured) as write:
+    with table_writer(outputs["estimates"], ESTIMATES, provenance, measured) as write:
         tables = simulated_tables(
             cells,
             provenance["seed"],

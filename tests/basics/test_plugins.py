@@ -148,19 +148,10 @@ def test_a_configuration_names_it():
     assert config_hash(content) == config_hash({**content, "plugins": ["other/ripple.py"]})
 
 
-def test_a_configuration_may_have_digests(capsys):
-    """As the files have them that this package writes; `config_hash` leaves them out."""
+def test_a_configuration_of_0_2_may_have_digests():
     with forgotten():
-        plugins.load_files(["ripple.py"])
-        with_digests = plugins.file_key()["plugins"]
-    assert [*with_digests] == ["ripple.py"]
-    with forgotten():
-        assert read_study(written(plugins=with_digests)).plugins == ["ripple.py"]
+        assert read_study(written(plugins={"ripple.py": "0" * 16})).plugins == ["ripple.py"]
         assert "ripple" in effect_names()
-    assert capsys.readouterr().err == ""
-    with forgotten():
-        read_study(written(plugins={"ripple.py": "0" * 16}))
-    assert "another ripple.py than is loaded" in capsys.readouterr().err
 
 
 # --- files of data, which may be of anybody ------------------------------------------------------

@@ -11,14 +11,14 @@ from accelstudy.basics.errors import InputError
 from accelstudy.campaign.calibration.sensor_calibration import read_calibration
 from accelstudy.campaign.importing.formats import open_source
 from accelstudy.files import reading
-from accelstudy.files.parquet import whole_parquet
 from accelstudy.files.reading import read_layer
+from accelstudy.files.tables import open_parquet
 
 UNREADABLE = Path("/proc/self/mem")  # it opens, and its first byte cannot be read
 
 
 def read_parquet(path):
-    with whole_parquet(path) as file:
+    with open_parquet(path) as file:
         return file.read()
 
 

@@ -8,7 +8,7 @@ import pytest
 from calling import refused
 from study_helpers import PROVENANCE
 
-from accelstudy.files.tables import parquet_writer, read_origin, read_table, write_table
+from accelstudy.files.tables import read_origin, read_table, table_writer, write_table
 
 TABLE = pd.DataFrame(
     {"cell": ["a", "b"] * 500, "value": np.random.default_rng(1).normal(size=1000)}
@@ -21,7 +21,7 @@ def write_at_once(path):
 
 def write_in_groups(path):
     content = pa.Table.from_pandas(TABLE, preserve_index=False)
-    with parquet_writer(path, content.schema, PROVENANCE, measured=["value"]) as write:
+    with table_writer(path, content.schema, PROVENANCE, measured=["value"]) as write:
         write(content[:300])
         write(content[300:])
 

@@ -32,7 +32,7 @@ from accelstudy.campaign.importing.recording import AXES, CONDITIONS, SensorLog,
 from accelstudy.campaign.importing.sources import LogFile
 from accelstudy.effects import HoldConditions, course_of_log
 from accelstudy.files.outputs import whole_file
-from accelstudy.files.parquet import write_parquet
+from accelstudy.files.tables import write_table
 from accelstudy.files.validation import validate
 from accelstudy.leveling.angles import near_pole
 from accelstudy.pages import render_lines
@@ -325,8 +325,10 @@ def _write_table(path: str | Path, table: pa.Table) -> None:
     """
     path = Path(path)
     try:
-        with whole_file(path) as temporary:
-            (write_parquet if _is_parquet(path) else _write_csv)(temporary, table)
+        if _is_parquet(path):
+            write_table(path, table)
+        else:
+            _write_csv(path, table)
     except OSError as error:
         raise InputError(f"{path}: cannot be written: {error.strerror or error}") from None
 
@@ -338,7 +340,10 @@ def _is_parquet(path: str | Path) -> bool:
 
 def _write_csv(path: Path, table: pa.Table) -> None:
     packed = path.suffix.lower() == ".gz"
-    with (gzip.open if packed else open)(path, "wt", encoding="utf-8", newline="") as file:
+    with (
+        whole_file(path) as temporary,
+        (gzip.open if packed else open)(temporary, "wt", encoding="utf-8", newline="") as file,
+    ):
         csv.writer(file, lineterminator="\n").writerow(table.column_names)
         for first in range(0, len(table), ROWS):
             file.write("".join(_lines(table.slice(first, ROWS))))

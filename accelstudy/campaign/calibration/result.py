@@ -35,7 +35,7 @@ from accelstudy.campaign.calibration.fit import CampaignFit
 from accelstudy.campaign.calibration.sensor_calibration import SensorCalibration, calibration_of
 from accelstudy.drawing.saving import save_all
 from accelstudy.files.outputs import CALIBRATION
-from accelstudy.files.parquet import write_frame
+from accelstudy.files.tables import write_table
 from accelstudy.leveling.error import MAX_TILT_GON
 from accelstudy.pages import write_page
 from accelstudy.pages.result import Result
@@ -221,7 +221,7 @@ class Calibration(Result):
             },
             folder / "figures",
         )
-        write_frame(folder / "positions.parquet", positions)
+        write_table(folder / "positions.parquet", positions)
         worst = positions.sort_values(
             ["suspect", "p_value"], ascending=[False, True], kind="stable"
         )

@@ -9,8 +9,8 @@ from accelstudy.basics.errors import InputError
 from accelstudy.campaign.importing import bags
 from accelstudy.campaign.importing.sources import LogFile, Source, open_matlab
 from accelstudy.campaign.importing.text import GZIP, TextSource
-from accelstudy.files.parquet import whole_parquet
 from accelstudy.files.reading import readable
+from accelstudy.files.tables import open_parquet
 
 _CONTROLS = re.compile(rb"[\x01-\x08\x0e-\x1a\x1c-\x1f]")
 """Bytes that no text has, in UTF-16 either."""
@@ -42,7 +42,7 @@ def open_source(path: LogFile, variable: str | None = None) -> Source:
     if not start:
         raise InputError(f"{path}: the file is empty")
     if path.suffix.lower() in (".parquet", ".pq"):
-        with whole_parquet(path) as parquet:
+        with open_parquet(path) as parquet:
             return Source(path, parquet.read())
     # An ASCII .mat has no zero bytes; every binary one has some in its header.
     if path.suffix.lower() == ".mat" and 0 in start:

@@ -25,7 +25,7 @@ from accelstudy.diagnosis.rules import RULES
 from accelstudy.drawing.saving import save_all
 from accelstudy.drawing.style import COLUMN
 from accelstudy.files.outputs import DIAGNOSIS, whole_file
-from accelstudy.files.parquet import write_frame
+from accelstudy.files.tables import write_table
 from accelstudy.pages import write_page
 from accelstudy.pages.result import Result
 from accelstudy.sensors.frames import FRD, axes_note
@@ -102,7 +102,7 @@ class Diagnosis(Result):
         made = None if isinstance(calibration, str) else calibration
         with stage("figures and page"):
             positions = document.positions_table(d)
-            write_frame(folder / "positions.parquet", positions)
+            write_table(folder / "positions.parquet", positions)
             if made is not None:
                 write_json(folder / "calibration.json", made)
             with whole_file(folder / "model.yaml") as path:
