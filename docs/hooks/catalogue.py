@@ -7,101 +7,86 @@ import re
 from markdown_text import code, page, plain, table
 
 import accelstudy
-from accelstudy.approaches import approach_names, get_approach
+from accelstudy.approaches import get_approach
 from accelstudy.basics.units import display_unit, to_attitude, to_display, unit_label
+from accelstudy.campaign.gross_errors import get_gross_error
 from accelstudy.campaign.importing.public import public_data
 from accelstudy.data_sheets import data_sheet_names, get_data_sheet
 from accelstudy.data_sheets.sheet import QUANTITIES
 from accelstudy.effects import get_effect
-from accelstudy.noise_effects import get_noise_effect, noise_effect_names
+from accelstudy.noise_effects import get_noise_effect
 from accelstudy.schemes import get_scheme, scheme_families, scheme_names
-from accelstudy.sensors.models import MODELS, PRESETS, get_model
+from accelstudy.sensors.models import MODELS, PRESETS
 from accelstudy.verbs.tables import plain_number as number
+
+KINDS = {
+    "effects": get_effect,
+    "noise effects": get_noise_effect,
+    "gross errors": get_gross_error,
+    "approaches": get_approach,
+}
+
+
+def effects(part):
+    """Effects of a part, sensor or rig, one a line."""
+    found = accelstudy.catalogue("effects").query("part == @part")
+    rows = [(f"[`{e.Index}`](#{e.Index})", _equation(e), e.family) for e in found.itertuples()]
+    return table(("effect", "what it adds", "family"), rows)
+
+
+def each(kind):
+    """All things of a kind, one after the other: the docstring of each, and its row."""
+    rows = accelstudy.catalogue(kind).itertuples()
+    return page(*(_entry(KINDS[kind](row.Index), row) for row in rows))
+
+
+def _entry(thing, row):
+    facts = {
+        "Formula": _equation(row),
+        "Parameters": getattr(row, "parameters", ""),
+        "Typical size": _typical(row),
+        "Needs of each hold": getattr(row, "needs", "").replace(" and the ", ", "),
+        "Family": getattr(row, "family", ""),
+    }
+    settings = []
+    for one in getattr(thing, "takes", ()):
+        ends = {"above": one.above, "below": one.below}
+        within = ", ".join(f"{word} {end:g}" for word, end in ends.items() if math.isfinite(end))
+        default = "drawn" if math.isnan(one.default) else number(one.default)
+        settings.append((code(one.name), _unit(one.unit), default, within))
+    return page(
+        f"## `{row.Index}`",
+        plain(inspect.cleandoc(type(thing).__doc__ or "")),
+        table(("", ""), [(f"**{name}**", fact) for name, fact in facts.items() if fact]),
+        table(("setting", "unit", "default", "range"), settings) if settings else "",
+    )
+
+
+def _equation(row):
+    """An equation as it is printed, with its indices set low."""
+    text = getattr(row, "equation", "").replace("<", "&lt;")
+    return re.sub(r"_([^\W_²³]+(?:,\w)?)", r"<sub>\1</sub>", text)
+
+
+def _typical(row):
+    if not hasattr(row, "typical_low"):
+        return ""
+    low, high = (number(to_display(end, row.unit)) for end in (row.typical_low, row.typical_high))
+    size = f"{low} … {high} {_unit(display_unit(row.unit))}".strip()
+    return f"{code(row.setting)}: {size}" if hasattr(row, "setting") else size
 
 
 def _unit(unit):
     return "" if unit == "1" else unit_label(unit)
 
 
-def _equation(thing):
-    """An equation as it is printed, with its indices set low."""
-    return re.sub(r"_([^\W_²³]+(?:,\w)?)", r"<sub>\1</sub>", thing.equation.replace("<", "&lt;"))
-
-
-def _entry(thing, facts):
-    """What an effect, an error or an approach says of itself, facts about it, and its settings."""
-    settings = []
-    for setting in getattr(thing, "takes", ()):
-        value = thing.settings[setting.name]
-        ends = {"above": setting.above, "below": setting.below}
-        within = ", ".join(f"{w} {end:g}" for w, end in ends.items() if math.isfinite(end))
-        default = "drawn" if math.isnan(value) else number(value)
-        settings.append((code(setting.name), _unit(setting.unit), default, within))
-    return page(
-        f"## `{thing.name}`",
-        plain(inspect.cleandoc(type(thing).__doc__ or "")),
-        table(("", ""), [(f"**{name}**", value) for name, value in facts.items() if value]),
-        table(("setting", "unit", "default", "range"), settings) if settings else "",
-    )
-
-
-def effects(part):
-    """Effects of a part, sensor or rig, one a line."""
-    rows = [
-        (f"[`{e.name}`](#{e.name})", _equation(e), len(e.parameters), e.family)
-        for e in map(get_effect, EFFECTS.index[EFFECTS["part"] == part])
-    ]
-    return table(("effect", "what it adds", "parameters", "family"), rows)
-
-
-def each(kind):
-    """All things of a kind, one after the other."""
-    get, names, facts = KINDS[kind]
-    return page(*(_entry(thing, facts(thing)) for thing in map(get, names())))
-
-
-def _of_effect(effect):
-    unit = effect.parameters[0].unit
-    low, high = map(number, to_display(effect.typical, unit))
-    return {
-        "Adds": _equation(effect),
-        "Parameters": ", ".join(f"{p.symbol} {code(p.name)}" for p in effect.parameters),
-        "Typical size": f"{low} … {high} {unit_label(display_unit(unit))}",
-        "Needs of each hold": EFFECTS["needs"][effect.name].replace(" and the ", ", "),
-        "Family": effect.family,
-    }
-
-
-def _of_noise_effect(effect):
-    first, (low, high) = effect.takes[0], map(number, effect.typical)
-    typical = f"{code(first.name)} is typically {low} … {high} {_unit(first.unit)}".strip()
-    return {"Noise": _equation(effect), "Typical size": typical}
-
-
-def _of_approach(approach):
-    outside = "roll and pitch" if approach.uses_angles else "none"
-    return {"Conditions per position": approach.n_conditions, "Angles from outside": outside}
-
-
-EFFECTS = accelstudy.catalogue("effects").sort_values("part", ascending=False, kind="stable")
-"""Those of the sensor, then those of the rig."""
-KINDS = {
-    "effects": (get_effect, lambda: EFFECTS.index, _of_effect),
-    "noise effects": (get_noise_effect, noise_effect_names, _of_noise_effect),
-    "approaches": (get_approach, approach_names, _of_approach),
-}
-
-
 def models():
     """Models."""
-    rows = [
-        (
-            code(name),
-            get_model(name).n_parameters,
-            ", ".join(f"[{effect}](effects.md#{effect})" for effect in own),
-        )
-        for name, own in MODELS.items()
-    ]
+    linked = {
+        name: ", ".join(f"[{e}](effects.md#{e})" for e in own) for name, own in MODELS.items()
+    }
+    numbers = accelstudy.catalogue("models")["n_parameters"]
+    rows = [(code(name), n, linked[name]) for name, n in numbers.items()]
     return table(("model", "parameters", "effects"), rows)
 
 
@@ -145,15 +130,15 @@ def _positions(directions):
 
 def data_sheets():
     """Data sheets, and where they come from."""
-    sheets = [get_data_sheet(name) for name in data_sheet_names()]
+    sheets = {name: get_data_sheet(name) for name in data_sheet_names()}
     rows = []
     for name, (unit, meaning) in QUANTITIES.items():
-        values = [getattr(sheet, name) for sheet in sheets]
-        shown = ["" if value is None else f"{number(to_display(value, unit))}" for value in values]
+        values = [getattr(sheet, name) for sheet in sheets.values()]
+        shown = ["" if value is None else number(to_display(value, unit)) for value in values]
         rows.append((code(name), meaning, _unit(display_unit(unit)), *shown))
-    sources = [(code(sheet.name), sheet.title, sheet.source) for sheet in sheets]
+    sources = [(code(name), sheet.title, sheet.source) for name, sheet in sheets.items()]
     return page(
-        table(("quantity", "meaning", "unit", *(code(sheet.name) for sheet in sheets)), rows),
+        table(("quantity", "meaning", "unit", *map(code, sheets)), rows),
         table(("name", "sensor", "source"), sources),
     )
 

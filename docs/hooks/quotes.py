@@ -1,7 +1,8 @@
 """What pages quote of computed numbers, put in while the site is built.
 
-A page says ``<!-- quotes.kept("logs", "xsens-mti") -->`` for a text of the golden set, and
-``{real-data: rms after}`` for a number of its part on public measurements.
+A page says ``<!-- quotes.kept("logs", "xsens-mti") -->`` for a text of the golden set,
+``<!-- quotes.printed("log", "accelstudy import") -->`` for what a command of an example prints, and
+``{real-data: rms after}`` for a number of the golden part on public measurements.
 
 Of the score of the hidden effects it says ``{score: figure; campaigns}`` for what was measured in
 the row with this figure and these campaigns, ``{score: figure; campaigns; %}`` for the same in
@@ -46,6 +47,19 @@ def quoted(figure, campaigns, what="", score=None):
 def kept(part, name):
     """A text of the golden set."""
     return (GOLDEN / part / f"{name}.txt").read_text(encoding="utf-8")
+
+
+def printed(example, *commands):
+    """What commands of an example print, by their beginnings; numbers at the end choose lines."""
+    ends = [one for one in commands if isinstance(one, int)] or [None]
+    (path,) = GOLDEN.glob(f"tutorial*/{example}.txt")
+    steps = path.read_text(encoding="utf-8").split("=== ")[1:]
+    chosen = [s for s in steps if s.startswith(tuple(c for c in commands if isinstance(c, str)))]
+    lines = []
+    for step in chosen:  # as on a terminal warnings come first, and files follow
+        said = step.partition("\n--- ")[0].splitlines()
+        lines += [line[2:] for mark in "!>" for line in said if line.startswith(mark)]
+    return "\n".join(lines[slice(*ends)])
 
 
 def number(name):

@@ -1,9 +1,8 @@
 """Run the examples as their reader would, in a folder of their own.
 
-python tests/helpers/example_helpers.py        # writes anew what docs/tutorials shows of them
+python tests/helpers/example_helpers.py        # draws anew the figures that docs/tutorials shows
 """
 
-import re
 import shutil
 import tempfile
 from pathlib import Path
@@ -13,7 +12,7 @@ from transcript import Shell, commands_of_script
 
 EXAMPLES = ROOT / "examples"
 SHOWN = ROOT / "docs" / "tutorials" / "shown"
-"""What pages show of the examples: output as <example>/<section>.txt, figures as PNG."""
+"""Figures of the examples, as pages show them."""
 FIGURES = {
     "paper": ["paper.png"],
     "log": ["box.png", "box/segmentation.png", "calibrated/figures/residuals.png"],
@@ -24,35 +23,18 @@ FIGURES = {
 """Figures of the examples that pages show."""
 
 
-def sections(example):
-    """Commands of each section of an example's commands.sh, {name: [command]}."""
-    text = (EXAMPLES / example / "commands.sh").read_text(encoding="utf-8")
-    found = re.findall(r"\[start:(\w+)\]\n(.*?)# --8<-- \[end:\1\]", text, re.DOTALL)
-    return {name: commands_of_script(block) for name, block in found}
-
-
 def run_example(example, folder):
-    """Run an example in an empty folder; what a terminal shows by section."""
+    """Run an example in an empty folder."""
     shutil.copytree(EXAMPLES / example, folder, dirs_exist_ok=True)
     shell = Shell(folder)
-    return {
-        name: "".join(map(shell.output, commands)) for name, commands in sections(example).items()
-    }
-
-
-def written_anew():
-    """Write what pages show of the examples."""
-    shutil.rmtree(SHOWN, ignore_errors=True)
-    for example in sorted(path.parent.name for path in EXAMPLES.glob("*/commands.sh")):
-        shown = SHOWN / example
-        shown.mkdir(parents=True)
-        with tempfile.TemporaryDirectory() as folder:
-            for name, output in run_example(example, Path(folder)).items():
-                if output:
-                    (shown / f"{name}.txt").write_text(output, encoding="utf-8")
-            for figure in FIGURES.get(example, ()):
-                shutil.copy(Path(folder, figure), shown)
+    for command in commands_of_script((folder / "commands.sh").read_text(encoding="utf-8")):
+        status, printed, warned = shell.run(command)
+        assert status == 0, f"{command}: {printed}{warned}"
 
 
 if __name__ == "__main__":
-    written_anew()
+    for name, figures in FIGURES.items():
+        with tempfile.TemporaryDirectory() as place:
+            run_example(name, Path(place, name))
+            for figure in figures:
+                shutil.copy(Path(place, name, figure), SHOWN / name)

@@ -198,13 +198,6 @@ class Shell:
             status = self._run(command, out, err)
             return status, _content(out), _content(err)
 
-    def output(self, command):
-        """What a command, which must end well, shows on a terminal."""
-        with tempfile.TemporaryFile() as shown:
-            if self._run(command, shown, shown):
-                raise RuntimeError(f"{command}: {_content(shown)}")
-            return "" if command.startswith(SILENT) else _content(shown)
-
     def _run(self, command, out, err):
         if command.startswith("cd "):
             self.folder /= command.split()[1]

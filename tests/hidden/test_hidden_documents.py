@@ -1,9 +1,8 @@
 """The documents on hidden effects: their score is that of the code, and the pages quote it."""
 
-import sys
-
 import pandas as pd
 import pytest
+import quotes
 from hidden_sample import SAMPLE, answers
 from places import ROOT
 
@@ -14,9 +13,6 @@ from studies.hidden.physics.generate import Case
 from studies.hidden.scoring.page import frames
 from studies.hidden.scoring.tables import SCORES
 from studies.hidden.study import SETS
-
-sys.path.insert(0, str(ROOT / "docs" / "hooks"))
-import quotes
 
 DOCS = ROOT / "docs"
 CONFIG = parse_hidden(read_layer(ROOT / "studies/hidden/config/hidden-effects.yaml"))

@@ -2,15 +2,15 @@
 
 import re
 from functools import cache
-from pathlib import Path
 
 import numpy as np
 import pytest
+import quotes
 import yaml
-from example_helpers import EXAMPLES, FIGURES, SHOWN, run_example, sections
+from example_helpers import EXAMPLES, run_example
 from golden import kept_of
-from page_helpers import assert_told_alike, numbers
-from pictures import BATCH, MADE_BY, REPORTS, overview, same_picture, seen, stale
+from page_helpers import numbers
+from pictures import BATCH, MADE_BY, REPORTS, overview, seen, stale
 from places import ROOT
 from stand_ins import drawn
 from usual import NINE
@@ -24,62 +24,24 @@ from accelstudy.schemes import get_scheme
 from accelstudy.simulation.sessions import Noise
 
 NAMES = sorted(path.parent.name for path in EXAMPLES.glob("*/commands.sh"))
-KEPT = {
-    "lot": "tutorial-lot", "sweep": "tutorial-sweep", "effect": "tutorials",
-    "paper": "tutorials", "pole": "tutorials",
-}  # fmt: skip
-"""Examples that take longer, and the parts of the golden set that run them."""
 
 
 @pytest.fixture(scope="module")
 def run(tmp_path_factory):
-    """Output of an example by section, and its folder; each runs once, when it is asked for."""
+    """Folder of an example, which runs once, when it is asked for."""
 
     @cache
     def ran(name):
         folder = tmp_path_factory.mktemp(name)
         with drawn():
-            return run_example(name, folder), folder
+            run_example(name, folder)
+        return folder
 
     return ran
 
 
-def kept_outputs(name):
-    """Output of an example by section, as the golden set keeps it; warnings come first."""
-    printed = {
-        step.partition("\n")[0]: "".join(re.findall("^! (.*\n)", step, re.M))
-        + "".join(re.findall("^> (.*\n)", step, re.M))
-        for step in kept_of(KEPT[name])[name].split("=== ")[1:]
-    }
-    return {
-        section: "".join(printed[command] for command in commands)
-        for section, commands in sections(name).items()
-    }
-
-
-def assert_shown(name, outputs):
-    shown = {path.stem: path.read_text("utf-8") for path in (SHOWN / name).glob("*.txt")}
-    assert shown.keys() == {section for section, output in outputs.items() if output}
-    for section, text in shown.items():
-        assert_told_alike(outputs[section], text)
-
-
-@pytest.mark.parametrize("name", KEPT)
-def test_the_tutorial_shows_what_the_golden_set_keeps(name):
-    assert_shown(name, kept_outputs(name))
-
-
-@pytest.mark.parametrize("name", [name for name in NAMES if name not in KEPT])
-def test_the_tutorial_shows_what_the_example_prints(run, name):
-    outputs, folder = run(name)
-    assert_shown(name, outputs)
-    for figure in FIGURES.get(name, ()):
-        kept = SHOWN / name / Path(figure).name
-        assert same_picture(folder / figure, kept), f"{kept} is old; `{MADE_BY}` makes it anew"
-
-
 def test_pictures_of_reports_show_what_the_reports_say(run, tmp_path):
-    folders = {name: run(name)[1] for name in ("log", "hidden")}
+    folders = {name: run(name) for name in ("log", "hidden")}
     pages = {name: folders[of] / page for name, (of, page, _) in REPORTS.items()}
     pages[BATCH[0]] = overview(*folders.values(), tmp_path / "batch")
     old = stale({name: seen(page) for name, page in pages.items()})
@@ -100,36 +62,39 @@ def of_lines(text):
 
 
 def test_a_robot_halves_the_tilt_error_of_the_paper():
-    lines = of_lines(kept_outputs("paper")["paper"])
+    lines = of_lines(quotes.printed("paper", "python"))
     for name, better in {"b_x": 0.41, "s_x": 0.28, "alpha_zx": 0.54, "roll": 0.5}.items():
         gravity, robot = lines[name][:2]
         assert 1 - robot / gravity == pytest.approx(better, abs=0.03)
     assert [lines[name][0] for name in ("gravity", "robot")] == [15, 63]
 
 
-def test_the_log_levels_to_what_its_calibration_promised(run):
-    outputs, _ = run("log")
-    raw, calibrated = (numbers(line) for line in outputs["apply"].splitlines()[1:])
-    promised = numbers(re.search("tilt error of .*? in pitch", outputs["calibrate"])[0])
+def test_the_log_levels_to_what_its_calibration_promised():
+    raw, calibrated = map(numbers, quotes.printed("log", "python compare").splitlines())
+    said = quotes.printed("log", "accelstudy calibrate")
+    promised = numbers(re.search("tilt error of .*? in pitch", said)[0])
     assert min(raw) > 250
     assert max(calibrated) < 1.5 * max(promised) < 4
-    assert "ACCEPTED" in outputs["calibrate"]
+    assert "ACCEPTED" in said
 
 
 def test_the_hidden_effect_is_found_and_explains_the_misfit(run):
-    outputs, folder = run("hidden")
-    assert "REJECTED" in outputs["calibrate"]
-    assert "ACCEPTED" in outputs["extend"]
-    assert "it is thermal bias" in outputs["diagnose"]
-    truth = yaml.safe_load((folder / "truth.yaml").read_text())["effects"][0]["parameters"]
-    found = of_lines(outputs["extend"])
+    plain, extended = (
+        quotes.printed("hidden", f"accelstudy calibrate session --approach robot {option}")
+        for option in ("--out plain", "--model")
+    )
+    assert "REJECTED" in plain
+    assert "ACCEPTED" in extended
+    assert "it is thermal bias" in quotes.printed("hidden", "accelstudy diagnose")
+    truth = yaml.safe_load((run("hidden") / "truth.yaml").read_text())["effects"][0]["parameters"]
+    found = of_lines(extended)
     for parameter in truth:
         value, sigma = found[parameter["name"]][:2]
         assert abs(value - 1e3 * parameter["value"]) < 3 * sigma
 
 
 def test_to_estimate_the_quadratic_term_pays_from_fifty_positions_on():
-    printed = kept_outputs("sweep")["read"].splitlines()
+    printed = quotes.printed("sweep", "python read").splitlines()
     n, *errors = np.transpose([numbers(line) for line in printed if line[0].isdigit()])
     gravity, robot = (estimated < left_out for left_out, estimated in (errors[:2], errors[2:]))
     assert n.tolist() == [14, 18, 24, 36, 50, 72]
@@ -138,13 +103,13 @@ def test_to_estimate_the_quadratic_term_pays_from_fifty_positions_on():
 
 
 def test_the_diagnosis_finds_an_effect_of_the_readers_own():
-    text = kept_outputs("effect")["find"]
+    text = quotes.printed("effect", "python find_ripple")
     assert "The model lacks ripple" in text
     assert float(re.search(r"ripple\(period=([\d.]+)\)$", text)[1]) == pytest.approx(5, abs=0.1)
 
 
-def test_the_sides_of_the_box_tell_the_scales_apart(run):
-    text = run("scheme")[0]["compare"]
+def test_the_sides_of_the_box_tell_the_scales_apart():
+    text = quotes.printed("scheme", "python compare")
     assert re.search("wedge-8 +gravity +rank 8 of 9: s_x, s_y, s_z", text)
     assert "rank" not in re.search("wedge-sides-8 +gravity.*", text)[0]
 

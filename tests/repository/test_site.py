@@ -136,8 +136,7 @@ def _lot():
     return Lot(lot, model, [None] * 3, {}).content
 
 
-def test_the_reference_says_what_the_kinds_of_keywords_mean(monkeypatch):
-    monkeypatch.syspath_prepend(ROOT / "docs/hooks")
+def test_the_reference_says_what_the_kinds_of_keywords_mean():
     path = ROOT / "accelstudy/verbs/calibrations.py"
     module = griffe.visit("accelstudy.verbs.calibrations", path, path.read_text(encoding="utf-8"))
     import_module("meanings").Meanings().on_object(obj=module["diagnose"])
