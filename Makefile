@@ -96,7 +96,6 @@ hidden-docs: $(READY) ## study hidden effects, and take score and figures into d
 	cp results/hidden-effects/score.md docs/guides/hidden-effects-score.md
 	for name in naming methods sets calibration outside; do \
 	  cp results/hidden-effects/figures/$$name.png docs/figures/hidden-$$name.png; done
-	python tests/helpers/pictures.py drawn hidden
 	python tests/helpers/hidden_sample.py
 
 # Of the logs in FOLDER, or downloaded to it: make real-noise FOLDER=~/logs

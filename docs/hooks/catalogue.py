@@ -9,7 +9,6 @@ from markdown_text import code, page, plain, table
 import accelstudy
 from accelstudy.approaches import get_approach
 from accelstudy.basics.units import display_unit, to_attitude, to_display, unit_label
-from accelstudy.campaign.gross_errors import get_gross_error
 from accelstudy.campaign.importing.public import public_data
 from accelstudy.data_sheets import data_sheet_names, get_data_sheet
 from accelstudy.data_sheets.sheet import QUANTITIES
@@ -22,7 +21,6 @@ from accelstudy.verbs.tables import plain_number as number
 KINDS = {
     "effects": get_effect,
     "noise effects": get_noise_effect,
-    "gross errors": get_gross_error,
     "approaches": get_approach,
 }
 

@@ -43,7 +43,7 @@ def test_what_is_refused_is_one_line_and_nothing_is_written():
     text = "".join(kept_of("refusals").values())
     answers = re.split(r"^(?:=== |accelstudy (?!.*…)).*\n", text, flags=re.M)[1:]
     assert len(answers) > 300
-    line = r"! error: .*\n+(accelstudy .*\n)?"  # and the command of the next ones
+    line = r"! error: .*\n+((accelstudy|parse) .*\n)?"  # and the command of the next ones
     assert [said for said in answers if not re.fullmatch(line, said)] == []
 
 

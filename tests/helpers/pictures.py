@@ -1,13 +1,11 @@
 """Pictures of the documents, and what each of them showed when it was made.
 
-    python tests/helpers/pictures.py               # make the pictures of reports and studies anew
-    python tests/helpers/pictures.py check         # compare the small study with what stands there
-    python tests/helpers/pictures.py drawn NAME    # take note that others of `DRAWN` are made anew
+    python tests/helpers/pictures.py          # make the pictures of reports and studies anew
+    python tests/helpers/pictures.py check    # compare the small study with what stands there
 
 docs/figures/shown.json knows what a reader sees on each picture: the words and numbers of a report,
 the texts of a figure and where its lines are. It has a hash of the words, and the numbers. Figures
-of a study are compared by those of the small study, which CI runs anyway. Of a picture that no test
-makes, it has a hash of the code that draws it, without layout and comments.
+of a study are compared by those of the small study, which CI runs anyway.
 """
 
 import contextlib
@@ -45,19 +43,6 @@ OF_STUDIES = {
     "report-explorer": ("explorer.html", (1100, 1360)),
 }
 """Pictures of the pages of a study."""
-DRAWN = {
-    "plan": ("the command in docs/guides/plan.md", "accelstudy/planning/figure.py"),
-    "history": ("the commands in docs/guides/history.md", "accelstudy/epochs/results.py"),
-    "designs-efficiency": ("make positions", "studies/positions/efficiency.py"),
-    "sequential": ("make positions", "studies/positions/stopping.py"),
-    "residuals": ("accelstudy calibrate", "accelstudy/campaign/calibration/figures.py"),
-    "sweeps": ("the studies in config/sweeps", "accelstudy/study/figures/sweep.py",
-               *(f"config/sweeps/{name}.yaml" for name in
-                 ("gravity_error", "noise_level", "positions", "robot_accuracy"))),
-    "hidden": ("make hidden-docs", "studies/hidden/scoring/figures.py",
-               "studies/hidden/scoring/score.yaml"),
-}  # fmt: skip
-"""Pictures that no test makes: what makes them, and the code that draws them."""
 
 
 def difference(kept, text):
@@ -104,18 +89,6 @@ def _drawn(axes):
     places = [re.findall(r"[\d.]+", d) if d else (x, y) for d, x, y in found]
     middle = [np.mean([float(p[i]) for p in places if len(p) > 1] or [0]) for i in (0, 1)]
     return f"{len(found)} drawn at {middle[0]:.2f} {middle[1]:.2f}"
-
-
-def code_of(*paths):
-    """Hash of files without comments, docstrings and layout."""
-    text = "\n".join((ROOT / path).read_text(encoding="utf-8") for path in paths)
-    text = re.sub(r'"""(?:.|\n)*?"""|^ *#.*$|  #.*$', "", text, flags=re.MULTILINE)
-    return hashed(re.sub(r"\s", "", text))
-
-
-def of_code():
-    """Hashes of the code that draws; the page on speed says itself of which version it is."""
-    return {name: code_of(*sources) for name, (_, *sources) in DRAWN.items()}
 
 
 def of_study(folder):
@@ -201,11 +174,9 @@ def make_anew():
 
 
 def main(*arguments):
-    """Make pictures anew, compare them, or take note of them."""
+    """Make pictures anew, or compare them."""
     if not arguments:
         make_anew()
-    elif arguments[0] == "drawn":
-        keep({name: of_code()[name] for name in arguments[1:]})
     elif old := stale(of_study(SMALL)):
         sys.exit(
             f"docs/figures: {', '.join(old)}: older than the code; `{MADE_BY}` makes them anew"

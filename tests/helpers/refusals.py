@@ -1,6 +1,7 @@
 """What commands say of damaged files and wrong options, as tests/golden/refusals.txt lists them.
 
-A command has a line that begins with `accelstudy`. Each indented line below it is one way to go
+A command has a line that begins with `accelstudy`, or `parse` and the name of a function that takes
+the content of a YAML file and its name. Each indented line below it is one way to go
 wrong: words that take the place of `…` in the command, or a change of a file. Changes are
 
     FILE = TEXT         other content, with the escapes of Python; of bytes, too
@@ -18,7 +19,9 @@ import shlex
 import shutil
 from contextlib import chdir
 from pathlib import Path
+from pkgutil import resolve_name
 from tempfile import TemporaryDirectory
+from types import SimpleNamespace
 from unittest import mock
 
 import stand_ins
@@ -28,7 +31,8 @@ from log_helpers import by_hand, table
 from places import ROOT
 from study_helpers import content as study_content
 
-from accelstudy.files.reading import overlay
+from accelstudy.basics.errors import InputError
+from accelstudy.files.reading import overlay, read_layer
 
 SCRIPT = ROOT / "tests/golden/refusals.txt"
 CHANGE = re.compile(r"(\w[\w./-]*) (=|\+=|~|-)(?: (.*))?")
@@ -43,6 +47,8 @@ def texts(folder):
     sound.mkdir()
     time, forces = by_hand()
     (sound / "study.yaml").write_text(json.dumps(study_content()))
+    for name in ("hidden-effects", "real-noise"):
+        shutil.copy(ROOT / f"studies/hidden/config/{name}.yaml", sound)
     table(forces, t=time)[["t", "fx", "fy", "fz"]].to_csv(sound / "log.csv", index=False)
     _, *parts = re.split(r"^# (.+)\n", SCRIPT.read_text("utf-8"), flags=re.MULTILINE)
     undrawn = mock.patch.object(stand_ins.saving, "_element", stand_ins.element)
@@ -73,7 +79,8 @@ def answer(sound, command, wrong=""):
         words = [part for part in wrong.split(" && ") if not changed(here, part)]
         before = content(here)
         with chdir(here):
-            result = call(*shlex.split(command.replace("…", " ".join(words)))[1:])
+            program, *words = shlex.split(command.replace("…", " ".join(words)))
+            result = (call if program == "accelstudy" else parsed)(*words)
         said = [f"! {line}\n" for line in result.stderr.splitlines()]
         said += [f"> {line}\n" for line in result.stdout.splitlines()]
         if result.exit_code != 2:
@@ -81,6 +88,15 @@ def answer(sound, command, wrong=""):
         if content(here) != before:
             said.append("files were written\n")
         return SHORT.sub(r"\1, …", "".join(said))
+
+
+def parsed(function, file):
+    """What a function says of a file, as the result of a command."""
+    try:
+        resolve_name(function)(read_layer(file), file)
+    except InputError as error:
+        return SimpleNamespace(stderr=f"error: {error}\n", stdout="", exit_code=2)
+    return SimpleNamespace(stderr="", stdout="", exit_code=0, exception=None)
 
 
 def changed(folder, text):

@@ -3,7 +3,6 @@
 from collections import Counter
 
 import pytest
-from calling import refused
 from places import ROOT
 
 from accelstudy.basics.errors import InputError
@@ -31,21 +30,6 @@ QUIET = CONFIG.model_copy(update={"baselines_every": 0})
 
 
 # --- the configuration ---------------------------------------------------------------------------
-
-
-WRONG = [
-    ({"nothing": {"campaigns": 1, "campaign": 3}}, "nothing.campaign: unknown key; did you mean"),
-    ({"designs": "spread-25"}, "designs: unknown design 'spread-25'; did you mean 'spread-24'?"),
-    ({"one": {"kinds": ["warmup"], "sizes": [25], "campaigns": 1}}, "one.kinds: unknown kind"),
-    ({"model": "nine"}, "model: unknown model 'nine'"),
-    ({"one": None, "removed": None}, "no campaigns; give at least one of nothing, noise"),
-]
-
-
-@pytest.mark.parametrize(("change", "said"), WRONG)
-def test_a_wrong_key_is_one_line(change, said):
-    with refused(start=f"my.yaml: {said}"):
-        parse_hidden({**TINY, **change}, "my.yaml")
 
 
 def test_a_kind_that_no_session_can_show():

@@ -9,7 +9,6 @@ from places import DATA, ROOT, needs_data
 from scipy import optimize, stats
 from snakemake_helpers import snakemake
 
-from accelstudy.basics.errors import InputError
 from accelstudy.campaign.importing.logs import import_log
 from accelstudy.campaign.importing.settings import ImportSettings
 from accelstudy.files.reading import read_layer
@@ -191,19 +190,6 @@ def test_what_an_answer_says(campaigns, expected, given):
 def test_of_a_function_learned_in_a_log_no_share_is_explained(campaigns):
     """Its true noise is not known."""
     assert judge([{**campaigns[0], "verdict": "learned"}])["explained"].isna().all()
-
-
-@pytest.mark.parametrize(("change", "says"), [
-    ({"effects": ["cubic_scale+wobble"]}, "effects: unknown effect 'wobble'"),
-    ({"effects": ["base_tilt"]}, "effects: unknown effect 'base_tilt'"),
-    ({"logs": {"mine": {"note": "?"}}}, "unknown public data 'mine'"),
-])  # fmt: skip
-def test_a_wrong_configuration_is_refused_in_a_line(change, says):
-    content = read_layer(ROOT / "studies/hidden/config/real-noise.yaml")
-    with pytest.raises(InputError) as error:
-        parse_hidden({**content, **change}, "config")
-    assert says in str(error.value)
-    assert "\n" not in str(error.value)
 
 
 def test_where_the_logs_are_changes_no_number():

@@ -4,32 +4,10 @@ Those of reports and tutorials are compared in test_examples.py, those of studie
 """
 
 import pytest
-from pictures import (
-    DRAWN,
-    PICTURES,
-    difference,
-    fingerprint,
-    kept,
-    of_code,
-    seen,
-)
+from pictures import difference, fingerprint, seen
 
 SVG = """<svg><defs><path d="M 0 0"/></defs><g id="axes_1"><!-- {} -->
 <path d="M 10 20 L 30 40"/><use xlink:href="#m" x="{}" y="50.0"/></g></svg>"""
-
-
-def test_no_picture_is_drawn_by_other_code_than_it_was():
-    stored = kept()
-    old = [f"{n}: {DRAWN[n][0]}" for n, now in of_code().items() if stored.get(n) != now]
-    assert not old, "\n".join(["docs/figures has pictures that other code drew:", *old,
-                               "then: python tests/helpers/pictures.py drawn NAME"])  # fmt: skip
-
-
-def test_each_picture_says_what_made_it():
-    beginnings = {"sweep-": "sweeps", "hidden-": "hidden", "residuals-": "residuals"}
-    for path in PICTURES.glob("*.png"):
-        own = next((v for k, v in beginnings.items() if path.stem.startswith(k)), path.stem)
-        assert own in kept(), path.name
 
 
 @pytest.mark.parametrize(("words", "x", "said"), [
