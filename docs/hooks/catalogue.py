@@ -41,10 +41,13 @@ def each(kind):
 def _entry(thing, row):
     facts = {
         "Formula": _equation(row),
-        "Parameters": getattr(row, "parameters", ""),
+        "Parameters": ", ".join(
+            f"{p.symbol} {code(p.name)}" for p in getattr(thing, "parameters", ())
+        ),
         "Typical size": _typical(row),
         "Needs of each hold": getattr(row, "needs", "").replace(" and the ", ", "),
         "Family": getattr(row, "family", ""),
+        "Conditions per position": getattr(thing, "n_conditions", ""),
     }
     settings = []
     for one in getattr(thing, "takes", ()):
@@ -67,11 +70,14 @@ def _equation(row):
 
 
 def _typical(row):
-    if not hasattr(row, "typical_low"):
+    if hasattr(row, "setting"):
+        ends, unit = (row.typical_low, row.typical_high), row.unit
+    elif hasattr(row, "typical_low"):
+        ends = to_display((row.typical_low, row.typical_high), row.unit)
+        unit = display_unit(row.unit)
+    else:
         return ""
-    low, high = (number(to_display(end, row.unit)) for end in (row.typical_low, row.typical_high))
-    size = f"{low} … {high} {_unit(display_unit(row.unit))}".strip()
-    return f"{code(row.setting)}: {size}" if hasattr(row, "setting") else size
+    return f"{' … '.join(map(number, ends))} {_unit(unit)} {code(getattr(row, 'setting', ''))}"
 
 
 def _unit(unit):
