@@ -34,40 +34,6 @@ STUDY = {
     }],
 }  # fmt: skip
 
-HEAD = """\
-import math
-from accelstudy.effects.base import Effect, per_axis, register
-
-class Base(Effect):
-    name = "mine"
-    parameters = per_axis("q", "1", "q_%")
-    def output(self, f, p, g, hold, xp):
-        return tuple(a * x for a, x in zip(p, f, strict=True))
-
-@register
-class Mine(Base):
-"""
-BAD = {
-    "twice": (f"{HEAD}    name = 'bias'", "the effect 'bias' is there already; choose another"),
-    "words": (f"{HEAD}    name = 'my own'", "'my own': a name has letters, digits and _ only"),
-    "parameter": (
-        f"{HEAD}    parameters = per_axis('b', 'm/s^2', 'b')",
-        "effect 'mine': b_x is a parameter of 'bias' already",
-    ),
-    "squares": (
-        f"{HEAD}    def output(self, f, p, g, hold, xp):\n        return p[0] ** 2, 0, 0",
-        "effect 'mine': q_x**2 is not linear in q_x, q_y, q_z",
-    ),
-    "components": (
-        f"{HEAD}    def output(self, f, p, g, hold, xp):\n        return p[:2]",
-        "effect 'mine': output has 2 components, not 3",
-    ),
-    "no symbols": (
-        f"{HEAD}    def output(self, f, p, g, hold, xp):\n        return math.exp(f[0]), 0, 0",
-        "line 13: TypeError: ",
-    ),
-}
-
 
 @pytest.fixture(autouse=True)
 def _here(tmp_path, monkeypatch):
@@ -96,15 +62,6 @@ def test_what_a_page_suggests_names_it_too():
     succeed("simulate-campaign", "--plugin", "ripple.py", "--out", "mine", *hidden)
     result = succeed("calibrate", "mine", "--model", "bias-scale+ripple", "--out", "new")
     assert ": accelstudy --plugin ripple.py " in result.stdout
-
-
-@pytest.mark.parametrize("case", BAD)
-def test_a_bad_one_is_one_line(case):
-    content, reason = BAD[case]
-    Path("bad.py").write_text(content)
-    line = refusal("--plugin", "bad.py", "effects")
-    assert line.startswith("error: bad.py: ")
-    assert reason in line
 
 
 def test_one_that_is_no_file_is_one_line():

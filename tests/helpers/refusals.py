@@ -1,15 +1,16 @@
 """What commands say of damaged files and wrong options, as tests/golden/refusals.txt lists them.
 
 A command has a line that begins with `accelstudy`, or `parse` and the name of a function that takes
-the content of a YAML file and its name. Each indented line below it is one way to go
-wrong: words that take the place of `…` in the command, or a change of a file. Changes are
+the content of a YAML file and its name. Each indented line below it is one way to go wrong: words
+that take the place of `…` in the command, or a change of a file. Changes are
 
     FILE = TEXT         other content, with the escapes of Python; of bytes, too
     FILE += {KEY: …}    other keys of YAML or JSON; null removes one
     FILE ~ OLD -> NEW   a regular expression, in all lines; one that finds nothing is an error
     FILE -              no file
 
-and several are joined by ` && `. A line `$ COMMAND` makes the files that are damaged below it.
+and several are joined by ` && `. A line `$ COMMAND` or `$ FILE = TEXT` makes the files that are
+damaged below it.
 """
 
 import json
@@ -61,9 +62,11 @@ def section(sound, lines):
     """What comes of some lines of the script, one after the other."""
     command = ""
     for line in filter(None, lines):
-        if line.startswith("$ "):
+        if line.startswith("$ accelstudy"):
             with chdir(sound):
                 succeed(*shlex.split(line)[2:])
+        elif line.startswith("$ "):
+            changed(sound, line[2:])
         elif line.startswith("  "):
             yield f"=== {line.strip()}\n{answer(sound, command, line.strip())}"
         else:
