@@ -77,7 +77,7 @@ def test_output_that_a_page_shows_is_what_came_out():
     kept = {line for part in PARTS for text in kept_of(part).values() for line in text.split("\n")}
     for path in {path for paths in PAGES.values() for path in paths if path.endswith(".md")}:
         text = (ROOT / path).read_text(encoding="utf-8")
-        shown = re.findall(r"^```\{\.text \.wrap\}\n((?!--8<--)[^`]*)^```", text, re.M)
+        shown = re.findall(r"^```\{\.text \.wrap\}\n((?!--8<--|<!-- )[^`]*)^```", text, re.M)
         lines = {f"> {line}" for line in "".join(shown).splitlines() if line}
         assert lines <= kept, lines - kept
 
