@@ -96,7 +96,7 @@ class _OneOrMore:
 
 
 def _plugin_names(value: Any) -> Any:
-    """Names of plug-ins: one, a list, or names with their digests, as a file of ours has."""
+    """Names of plug-ins: one, a list, or a mapping from names to digests, as 0.2 wrote them."""
     if isinstance(value, Mapping):
         return list(value)
     return [value] if isinstance(value, str) else value
