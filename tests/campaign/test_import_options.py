@@ -8,6 +8,7 @@ from places import DATA, needs_data
 from stand_ins import drawn
 
 import accelstudy as acs
+from accelstudy.basics.errors import InputError
 from accelstudy.basics.units import GON, MGON
 from accelstudy.campaign.format import read_campaign
 from accelstudy.campaign.header import LogLayout
@@ -84,6 +85,16 @@ def test_frames(turned, unit):
     assert found.log.frame == "flu"
     if unit == "counts":
         np.testing.assert_array_equal(found.nominal.scale, [0.001, -0.002, -0.003])
+
+
+def test_numbers_with_a_scale_are_counts(turned):
+    raw = turned[0] / 0.001
+    expected = acs.find_holds(table(raw), rate=RATE, unit="counts", scale=0.001)
+    found = acs.find_holds(table(raw), rate=RATE, scale=0.001)
+    assert found.unit == expected.unit == "counts"
+    np.testing.assert_array_equal(found.forces, expected.forces)
+    with pytest.raises(InputError, match="goes with unit counts, not g"):
+        acs.find_holds(table(raw), rate=RATE, unit="g", scale=0.001)
 
 
 def test_temperature_vibration_and_range(turned):

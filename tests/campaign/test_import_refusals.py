@@ -86,7 +86,8 @@ REFUSED = [
     (("log.mat", matlab(log=TABLE, other=FORCES)), "--rate 4", "which array? There are log, other"),
     (("log.mat", matlab(log=TABLE, other=FORCES)), "--variable othr", "did you mean 'other'"),
     (("log.mat", matlab(log=1j * TABLE)), BY_PLACE, "array log has complex numbers"),
-    (1e4 * HELD, "--rate 100", "look like counts, not m/s^2, and need a scale; give --unit counts"),
+    (1e4 * HELD, "--rate 100", "look like counts, not m/s^2; give their nominal scale (--scale), "
+     "about 0.0001 m/s² per count"),
     # Holds.
     (np.repeat(np.eye(4, 3) * G, 300, axis=0), "--rate 100 --window 0.5", "frozen"),
     (moved(0.5, 4.0, 3), "--rate 100", NEVER),  # waved about

@@ -177,13 +177,14 @@ def check_size(
         )
     sizes = UNITS["m/s^2"]
     better = [u for u in SENSOR_UNITS if u != unit and near(number * sizes[u], gravity)]
-    if not better and unit != "counts" and number > 100:
-        better = ["counts"]
     if better:
-        needs = ", and need a scale" if better == ["counts"] else ""
         raise InputError(
-            f"{where}: {what}: these look like {better[0]}, not {unit}{needs}; give `unit` "
-            f"{better[0]}"
+            f"{where}: {what}: these look like {better[0]}, not {unit}; give `unit` {better[0]}"
+        )
+    if unit != "counts" and number > 100:
+        raise InputError(
+            f"{where}: {what}: these look like counts, not {unit}; give their nominal scale "
+            f"(`scale`), about {gravity / number:.3g} m/s² per count"
         )
     raise InputError(
         f"{where}: {what}, nowhere near gravity, {gravity:g} m/s²; give another `unit`, `scale` or "

@@ -100,7 +100,8 @@ def read_log(
             "change them"
         ) from None
     if another:
-        told = {**_units(source, places), **told}
+        scaled = {"unit": "counts"} if given.keys() & {"scale", "offset"} else {}
+        told = {**scaled, **_units(source, places), **told}
         chosen = _laid_over(like, overlay(told, given), kind)
     return SensorLog(source, chosen, places)
 
