@@ -57,7 +57,7 @@ def run(speeds):
 
 def _plain(cell):
     """Statistics without linear theory."""
-    return statistics(cell, (part._replace(linear=None) for part in simulate(cell, 1)))
+    return statistics(cell, simulate(cell, 1)._replace(linear=None))
 
 
 def _needed(found, count):

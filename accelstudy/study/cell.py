@@ -26,7 +26,7 @@ from accelstudy.simulation.sessions import Noise, Session, session
 
 Array = NDArray[np.float64]
 
-MEGABYTES, BYTES_PER_ESTIMATE = 1000, 60
+MEGABYTES, BYTES_PER_ESTIMATE = 1000, 150
 """Memory of a job: at least, and for each estimate of its largest cell."""
 
 

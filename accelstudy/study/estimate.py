@@ -21,7 +21,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -78,136 +78,93 @@ UNKNOWN = Estimates(*np.full(4, np.nan))
 """What nothing is known of; scaling it makes arrays of it."""
 
 
-@dataclass(frozen=True)
-class Sample:
-    """Numbers of replicates: their moments, and the first ones themselves.
+# --- statistics of numbers (k, R) of R replicates -------------------------------------------------
 
-    Attributes
-    ----------
-    count : int
-    mean : (k,) array
-    products : (k, k) array, sums of products of deviations from the mean
-    first : (k, r) array, at most `MAX_INFLUENCES`
-    """
-
-    count: int
-    mean: Array
-    products: Array
-    first: Array
-
-    @classmethod
-    def of(cls, x: Array) -> Sample:
-        """Take the moments of numbers (k, R)."""
-        mean = x.mean(axis=1) if x.size else np.zeros(len(x))
-        apart = x - mean[:, None]
-        return cls(x.shape[1], mean, apart @ apart.T, x[:, :MAX_INFLUENCES])
-
-    def __getitem__(self, rows: slice) -> Sample:
-        return Sample(self.count, self.mean[rows], self.products[rows, rows], self.first[rows])
-
-    def __add__(self, more: Sample) -> Sample:
-        """Join with a sample that follows (Chan, Golub & LeVeque 1983, *Am. Stat.* 37, 242)."""
-        count, step = self.count + more.count, more.mean - self.mean
-        share = more.count / max(count, 1)
-        products = self.products + more.products + self.count * share * np.outer(step, step)
-        return Sample(count, self.mean + share * step, products, self.first)
-
-    @property
-    def sd(self) -> Array:
-        """Standard deviations, (k,)."""
-        return np.sqrt(np.diagonal(self.products) / np.float64(self.count - 1))
+Statistic = Callable[[Array], tuple[Array, Array]]
+"""Function of numbers (k, R) of replicates: the statistics (m,), and the influences (m, r) on them
+of the first r replicates, at most `MAX_INFLUENCES`."""
 
 
-class Statistic(NamedTuple):
-    """A statistic of numbers of replicates.
-
-    Attributes
-    ----------
-    value : function of the sample; the statistics, (m,)
-    influence : function of numbers (R, k) and the statistics; the influences, (R, m)
-    """
-
-    value: Callable[[Sample], Array]
-    influence: Callable[[Array, Array], Array]
+def mean(x: Array) -> tuple[Array, Array]:
+    """Mean of each number."""
+    value = x.mean(axis=1)
+    return value, x[:, :MAX_INFLUENCES] - value[:, None]
 
 
-def _sd_influence(x: Array, sd: Array) -> Array:
-    return np.asarray(((x - x.mean(axis=0)) ** 2 / sd**2 - 1) * sd / 2)
+def sd(x: Array) -> tuple[Array, Array]:
+    """Standard deviation of each number."""
+    value, first = _sd(x), x[:, :MAX_INFLUENCES]
+    z = (first - first.mean(axis=1, keepdims=True)) / value[:, None]
+    return value, value[:, None] / 2 * (z**2 - 1)
 
 
-def _correlation(sample: Sample) -> Array:
-    scale = np.sqrt(np.diagonal(sample.products))
-    return (sample.products / np.outer(scale, scale))[np.tril_indices(len(scale), -1)]
+def root_mean(x: Array) -> tuple[Array, Array]:
+    """Root of the mean of each number, which is a square."""
+    square, influence = mean(x)
+    value = np.sqrt(square)
+    return value, influence / (2 * value[:, None])
 
 
-def _correlation_influence(x: Array, correlation: Array) -> Array:
-    i, j = np.tril_indices(x.shape[1], -1)
-    z = (x - x.mean(axis=0)) / x.std(axis=0)
-    return np.asarray(z[:, i] * z[:, j] - correlation * (z[:, i] ** 2 + z[:, j] ** 2) / 2)
+def ratio(x: Array) -> tuple[Array, Array]:
+    """Mean of each number of the first half over the sd of its twin in the second half."""
+    (above, of_above), (below, of_below) = mean(x[: len(x) // 2]), sd(x[len(x) // 2 :])
+    value = above / below
+    relative = of_above / above[:, None] - of_below / below[:, None]
+    return value, value[:, None] * relative
 
 
-def _ratio(sample: Sample) -> Array:
-    sigma, _ = np.split(sample.mean, 2)
-    return np.asarray(sigma / np.split(sample.sd, 2)[1])
+def correlation(x: Array) -> tuple[Array, Array]:
+    """Correlations below the diagonal, in the order of `numpy.tril_indices`."""
+    z = (x - x.mean(axis=1, keepdims=True)) / x.std(axis=1, keepdims=True)
+    i, j = np.tril_indices(len(x), -1)
+    value, first = (z @ z.T / x.shape[1])[i, j], z[:, :MAX_INFLUENCES]
+    squares = first[i] ** 2 + first[j] ** 2
+    return value, first[i] * first[j] - value[:, None] / 2 * squares
 
 
-def _ratio_influence(x: Array, ratio: Array) -> Array:
-    sigma, error = np.hsplit(x, 2)
-    sd = Sample.of(error.T).sd
-    return np.asarray(ratio * (sigma / sigma.mean(axis=0) - 1 - _sd_influence(error, sd) / sd))
-
-
-MEAN = Statistic(lambda sample: sample.mean, lambda x, mean: np.asarray(x - mean))
-SD = Statistic(lambda sample: sample.sd, _sd_influence)
-ROOT_MEAN = Statistic(
-    lambda sample: np.sqrt(sample.mean), lambda x, root: np.asarray((x - root**2) / (2 * root))
-)
-"""Root of the mean; the numbers are squares."""
-CORRELATION = Statistic(_correlation, _correlation_influence)
-"""Correlations below the diagonal, in the order of `numpy.tril_indices`."""
-RATIO = Statistic(_ratio, _ratio_influence)
-"""Mean of the first half of the columns over the standard deviation of the second."""
+def _sd(x: Array) -> Array:
+    """Standard deviation of each row; NaN of a single number."""
+    apart = x - x.mean(axis=1, keepdims=True)
+    return np.sqrt(np.einsum("kr,kr->k", apart, apart) / np.float64(x.shape[1] - 1))
 
 
 def controlled(
     statistic: Statistic,
-    own: Sample,
-    theory: Sample | None = None,
-    known: Array | float = np.nan,
-    converged: NDArray[np.bool_] | None = None,
+    own: Array,
+    theory: Array | None,
+    known: Array | float,
+    converged: NDArray[np.bool_],
 ) -> Estimates:
     """Estimate a statistic of replicates, corrected by that of linear theory of the same noise.
 
     Parameters
     ----------
     statistic : Statistic
-    own : Sample, numbers of the calibrations that converged
-    theory : Sample, numbers of linear theory of all R replicates; None without any
+    own : (k, c) array, numbers of the calibrations that converged
+    theory : (k, R) array, the same of linear theory of all replicates; None without any
     known : (m,) array, the statistics by linear theory; NaN where it does not know them
-    converged : (R,) bool array, with as many true as converged; by default all are
+    converged : (R,) bool array, of which c are true
 
     Returns
     -------
     Estimates, (m,)
     """
-    n = own.count if converged is None else len(converged)
-    some = np.ones(own.first.shape[1], bool) if converged is None else converged[:MAX_INFLUENCES]
+    n, some = len(converged), converged[:MAX_INFLUENCES]
     with np.errstate(divide="ignore", invalid="ignore"):
-        plain = statistic.value(own)
-        x = np.zeros((len(some), len(plain)))
-        x[some] = statistic.influence(own.first[:, : some.sum()].T, plain) / some.mean()
-        alone = Sample.of(x.T).sd / np.sqrt(n)
+        plain, influence = statistic(own)
+        x = np.zeros((len(plain), len(some)))
+        x[:, some] = influence[:, : some.sum()] / some.mean()
+        alone = _sd(x) / np.sqrt(n)
         if theory is None or n < MIN_REPLICATES:
             return Estimates(plain, alone, np.ones_like(plain), plain)
-        expected = statistic.value(theory)
-        y = statistic.influence(theory.first.T, expected)
-        x, y = x - x.mean(axis=0), y - y.mean(axis=0)
-        spread = (y * y).sum(axis=0)
+        expected, y = statistic(theory)
+        x, y = (each - each.mean(axis=1, keepdims=True) for each in (x, y))
+        spread = (y * y).sum(axis=1)
         used = np.isfinite(np.broadcast_to(known, spread.shape)) & (spread > 0)
-        slope = np.where(used, (x * y).sum(axis=0) / spread, 0.0)
+        slope = np.where(used, (x * y).sum(axis=1) / spread, 0.0)
         # Each replicate is off a regression without it by more than off that with it.
-        leverage = np.minimum(1 / len(y) + y * y / spread, HIGHEST_LEVERAGE)
-        left = Sample.of(((x - slope * y) / (1 - leverage)).T).sd / np.sqrt(n)
+        leverage = np.minimum(1 / len(some) + y * y / spread[:, None], HIGHEST_LEVERAGE)
+        left = _sd((x - slope[:, None] * y) / (1 - leverage)) / np.sqrt(n)
         error = np.maximum(np.where(used, left, alone), ROUNDING * alone)
         value = plain - np.where(used, slope * (expected - known), 0.0)
         return Estimates(value, error, np.where(used, (alone / error) ** 2, 1.0), plain)
@@ -225,9 +182,9 @@ def usual_levels(count: int) -> Array:
 def controlled_quantiles(
     levels: Array,
     own: Array,
-    theory: Array | None = None,
-    known: Array | None = None,
-    converged: NDArray[np.bool_] | None = None,
+    theory: Array | None,
+    known: Array,
+    converged: NDArray[np.bool_],
     known_error: ArrayLike = 0.0,
 ) -> Estimates:
     """Estimate quantiles of a number of each replicate.
@@ -238,7 +195,7 @@ def controlled_quantiles(
     own : (c,) array, the number in the calibrations that converged
     theory : (R,) array, the number in linear theory of all R replicates; None without any
     known : (k,) array, its quantiles; NaN where they are not known
-    converged : (R,) bool array, with c true; by default all are
+    converged : (R,) bool array, of which c are true
     known_error : (k,) array, relative errors of `known`
 
     Returns
@@ -251,10 +208,10 @@ def controlled_quantiles(
     slope = (high - low) / (2 * wide)
     # Too few values have no density: their error is unknown.
     variance = p * (1 - p) / count * (slope**2 if count >= MIN_REPLICATES else np.nan)
-    if count < MIN_REPLICATES or theory is None or known is None or not np.isfinite(known).all():
+    if count < MIN_REPLICATES or theory is None or not np.isfinite(known).all():
         return Estimates(plain, np.sqrt(variance), np.ones(len(p)), plain)
     failed = len(theory) - count
-    paired = theory[converged] if failed else theory
+    paired = theory[converged]
     linear, low, high = _quantiles(theory, p, wide)
     some = slice(DIFFERENCE_REPLICATES)
     sd = _sd_near(own[some] - paired[some], paired[some], p, wide)

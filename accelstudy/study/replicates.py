@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterable, Iterator
+from collections.abc import Collection, Iterator, Sequence
 from dataclasses import replace
 from itertools import islice
 from typing import NamedTuple
@@ -21,7 +21,7 @@ from accelstudy.study.compiling import calibrator
 Array = NDArray[np.float64]
 
 CHUNK = 10_000
-"""Replicates that are simulated, stored and summed up together; few enough for the cache."""
+"""Replicates that are calibrated and stored together; few enough for the cache."""
 _NAME = pa.dictionary(pa.int32(), pa.string())
 ESTIMATES = pa.schema(
     [
@@ -50,23 +50,21 @@ same noise; NaN where there is none. Columns that repeat within a replicate hard
 
 
 class Replicates(NamedTuple):
-    """Replicates of a cell that follow each other: all that statistics and files are made of.
+    """The replicates of a cell: all that statistics and files are made of.
 
     Attributes
     ----------
-    first : int, number of the first one
     simulated : Block, the calibrations
     linear : Block, those of linear theory of the same noise; None if there is no linear theory, as
         the session without noise has no calibration
     """
 
-    first: int
     simulated: Block
     linear: Block | None
 
 
-def simulate(cell: Cell, seed: int) -> Iterator[Replicates]:
-    """Simulate and calibrate all replicates of an estimable cell, `CHUNK` by `CHUNK`.
+def simulate(cell: Cell, seed: int) -> Replicates:
+    """Simulate and calibrate all replicates of an estimable cell.
 
     Parameters
     ----------
@@ -82,63 +80,72 @@ def simulate(cell: Cell, seed: int) -> Iterator[Replicates]:
         BLOCK,
         angles=cell.conditions.uses_angles,
     )
-    for first in range(0, cell.replicates, CHUNK):
-        errors, observed = zip(*islice(drawn, CHUNK // BLOCK), strict=True)
-        together = Observations.concatenate(observed)
-        simulated = calibrate(cell.estimated_model, cell.conditions, together)
-        linear = None if theory is None else _by_theory(theory, cell, errors, simulated)
-        yield Replicates(first, simulated, linear)
+    simulated, linear = [], []
+    while chunk := [*islice(drawn, CHUNK // BLOCK)]:
+        together = Observations.concatenate([observed for _, observed in chunk])
+        simulated.append(calibrate(cell.estimated_model, cell.conditions, together))
+        if theory is not None:
+            linear += [_by_theory(theory, cell, errors) for errors, _ in chunk]
+    whole = _joined(simulated)
+    if theory is None:
+        return Replicates(whole, None)
+    estimates, omegas = map(np.concatenate, zip(*linear, strict=True))
+    by_theory = replace(
+        whole,
+        estimates=estimates,
+        sigma_priori=np.broadcast_to(theory.sigma, estimates.shape),
+        omega=omegas,
+        converged=np.ones(len(omegas), bool),
+    )
+    return Replicates(whole, by_theory)
 
 
-def _by_theory(
-    theory: LinearTheory, cell: Cell, errors: Iterable[Errors], simulated: Block
-) -> Block:
-    """Calibrations by linear theory of the errors of blocks."""
-    estimates, omegas = [], []
-    for block in errors:
-        noise = [block.force]
-        if cell.conditions.uses_angles and block.angle is not None:
-            noise.append(block.angle)
-        shift, omega = theory.errors(np.concatenate(noise, axis=-1), block.gravity)
-        estimates.append(theory.reference + shift)
-        omegas.append(omega)
-    return replace(
+def _joined(blocks: Sequence[Block]) -> Block:
+    """Blocks of replicates that follow each other as one."""
+    names = ("estimates", "sigma_priori", "omega", "iterations", "converged")
+    arrays = {name: np.concatenate([getattr(block, name) for block in blocks]) for name in names}
+    return replace(blocks[0], **arrays, correlation_sum=sum(b.correlation_sum for b in blocks))
+
+
+def _by_theory(theory: LinearTheory, cell: Cell, errors: Errors) -> tuple[Array, Array]:
+    """Estimates (R, u) and Ω (R,) of calibrations by linear theory of the errors of a block."""
+    noise = [errors.force]
+    if cell.conditions.uses_angles and errors.angle is not None:
+        noise.append(errors.angle)
+    shift, omega = theory.errors(np.concatenate(noise, axis=-1), errors.gravity)
+    return theory.reference + shift, omega
+
+
+def estimates_tables(cell: Cell, replicates: Replicates) -> Iterator[pa.Table]:
+    """Rows of `ESTIMATES` of a cell, `CHUNK` replicates at a time."""
+    simulated, linear = replicates
+    beside = linear or replace(
         simulated,
-        estimates=np.concatenate(estimates),
-        sigma_priori=np.broadcast_to(theory.sigma, simulated.estimates.shape),
-        omega=np.concatenate(omegas),
-        converged=np.ones(len(simulated.omega), bool),
+        estimates=np.full_like(simulated.estimates, np.nan),
+        omega=np.full_like(simulated.omega, np.nan),
     )
+    for first in range(0, cell.replicates, CHUNK):
+        part = slice(first, first + CHUNK)
+        count, u = simulated.estimates[part].shape
 
+        def coded(names: Collection[str], rows: int = count * u) -> pa.DictionaryArray:
+            different = [*dict.fromkeys(names)]
+            codes = np.array([different.index(name) for name in names], np.int32)
+            return pa.DictionaryArray.from_arrays(np.tile(codes, rows // len(codes)), different)
 
-def estimates_table(cell: Cell, replicates: Replicates) -> pa.Table:
-    """Rows of `ESTIMATES` of some replicates of a cell."""
-    first, simulated, linear = replicates
-    count, u = simulated.estimates.shape
-    estimates, omega = (
-        (np.full((count, u), np.nan), np.full(count, np.nan))
-        if linear is None
-        else (linear.estimates, linear.omega)
-    )
-
-    def coded(names: Collection[str]) -> pa.DictionaryArray:
-        different = [*dict.fromkeys(names)]
-        codes = np.array([different.index(name) for name in names], np.int32)
-        return pa.DictionaryArray.from_arrays(np.tile(codes, count * u // len(codes)), different)
-
-    columns = {
-        "cell": coded([cell.name]),
-        "replicate": np.repeat(np.arange(first, first + count), u),
-        "parameter": coded(cell.parameter_units.keys()),
-        "unit": coded(cell.parameter_units.values()),
-        "truth": np.tile(cell.true_values, count),
-        "estimate": simulated.estimates.ravel(),
-        "linear_estimate": estimates.ravel(),
-        "sigma_priori": simulated.sigma_priori.ravel(),
-        "omega": np.repeat(simulated.omega, u),
-        "linear_omega": np.repeat(omega, u),
-        "redundancy": np.full(count * u, simulated.redundancy),
-        "iterations": np.repeat(simulated.iterations, u),
-        "converged": np.repeat(simulated.converged, u),
-    }
-    return pa.table(columns, schema=ESTIMATES)
+        columns = {
+            "cell": coded([cell.name]),
+            "replicate": np.repeat(np.arange(first, first + count), u),
+            "parameter": coded(cell.parameter_units.keys()),
+            "unit": coded(cell.parameter_units.values()),
+            "truth": np.tile(cell.true_values, count),
+            "estimate": simulated.estimates[part].ravel(),
+            "linear_estimate": beside.estimates[part].ravel(),
+            "sigma_priori": simulated.sigma_priori[part].ravel(),
+            "omega": np.repeat(simulated.omega[part], u),
+            "linear_omega": np.repeat(beside.omega[part], u),
+            "redundancy": np.full(count * u, simulated.redundancy),
+            "iterations": np.repeat(simulated.iterations[part], u),
+            "converged": np.repeat(simulated.converged[part], u),
+        }
+        yield pa.table(columns, schema=ESTIMATES)

@@ -27,7 +27,7 @@ from accelstudy.schemes import get_scheme
 from accelstudy.sensors.models import get_model
 from accelstudy.study.cell import Cell
 from accelstudy.study.config import parse_study
-from accelstudy.study.replicates import ESTIMATES, estimates_table, simulate
+from accelstudy.study.replicates import ESTIMATES, estimates_tables, simulate
 from accelstudy.study.statistics import ANGLES, TILT, CellStatistics, simulated_statistics
 from accelstudy.study.tables import tables_of, with_derived
 
@@ -200,10 +200,10 @@ class Simulation(Result):
         sigma_posteriori. Cells that cannot be estimated have no rows.
         """
         each = (
-            estimates_table(cell, replicates)
+            table
             for cell in self.cells
             if cell.estimability.estimable
-            for replicates in simulate(cell, self._seed)
+            for table in estimates_tables(cell, simulate(cell, self._seed))
         )
         table = pa.concat_tables([ESTIMATES.empty_table(), *each])
         return with_derived(table.unify_dictionaries().to_pandas())

@@ -16,7 +16,7 @@ from accelstudy.basics.units import GON, MGON, recorded_unit, to_recorded
 from accelstudy.files.tables import read_table, table_writer, write_table
 from accelstudy.study.cell import Cell
 from accelstudy.study.estimate import UNKNOWN, Estimates
-from accelstudy.study.replicates import ESTIMATES, Replicates, estimates_table
+from accelstudy.study.replicates import ESTIMATES, Replicates, estimates_tables
 from accelstudy.study.statistics import (
     ANGLES,
     TILT,
@@ -47,7 +47,7 @@ def simulated_tables(
     ----------
     cells : sequence of Cell
     seed : int, of the study
-    keep : function that gets each cell with its replicates as they are simulated
+    keep : function that gets each cell with its replicates
     """
 
     def results() -> Iterator[CellStatistics]:
@@ -79,11 +79,12 @@ def simulate_cells(
     """
     measured = ("estimate", "linear_estimate", "sigma_priori")
     with table_writer(outputs["estimates"], ESTIMATES, provenance, measured) as write:
-        tables = simulated_tables(
-            cells,
-            provenance["seed"],
-            lambda cell, replicates: write(estimates_table(cell, replicates)),
-        )
+
+        def keep(cell: Cell, replicates: Replicates) -> None:
+            for table in estimates_tables(cell, replicates):
+                write(table)
+
+        tables = simulated_tables(cells, provenance["seed"], keep)
     for name in TABLES:
         write_table(outputs[name], tables[name], provenance)
 

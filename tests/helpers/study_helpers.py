@@ -37,14 +37,13 @@ def make_cells(*grids, **keys):
 
 
 def simulated(cell, seed=1):
-    """The replicates of a cell that has at most 10 000."""
-    (part,) = simulate(cell, seed)
-    return part.simulated
+    """The calibrations of a cell."""
+    return simulate(cell, seed).simulated
 
 
 def plain(cell, seed):
     """Statistics of a cell without linear theory."""
-    return statistics(cell, (part._replace(linear=None) for part in simulate(cell, seed)))
+    return statistics(cell, simulate(cell, seed)._replace(linear=None))
 
 
 def simulate_cells(folder, cells, seed=1):

@@ -9,15 +9,14 @@ from study_helpers import grid, make_cells, plain, run_study
 from usual import STANDARD_ERRORS
 
 from accelstudy.study.estimate import (
-    CORRELATION,
-    MEAN,
     PROBABILITIES,
-    RATIO,
-    ROOT_MEAN,
-    SD,
-    Sample,
     controlled,
     controlled_quantiles,
+    correlation,
+    mean,
+    ratio,
+    root_mean,
+    sd,
 )
 from accelstudy.study.statistics import TILT, simulated_statistics
 
@@ -38,12 +37,12 @@ def cell_of(sigma=0.002, approach="gravity", replicates=1000, **keys):
 SIGMA = np.array([1.0, 2.0, 0.5])
 ROOT = np.linalg.cholesky(np.array([[1.0, 0.6, 0.0], [0.6, 1.0, -0.3], [0.0, -0.3, 1.0]]))
 KNOWN = {
-    "mean": (MEAN, np.zeros(3)),
-    "share": (MEAN, np.full(3, 0.95)),
-    "sd": (SD, SIGMA),
-    "rms": (ROOT_MEAN, SIGMA),
-    "correlation": (CORRELATION, np.array([0.6, 0.0, -0.3])),
-    "ratio": (RATIO, np.sqrt(2 / np.pi) * SIGMA / SIGMA),
+    "mean": (mean, np.zeros(3)),
+    "share": (mean, np.full(3, 0.95)),
+    "sd": (sd, SIGMA),
+    "rms": (root_mean, SIGMA),
+    "correlation": (correlation, np.array([0.6, 0.0, -0.3])),
+    "ratio": (ratio, np.sqrt(2 / np.pi) * SIGMA / SIGMA),
 }
 """Statistics of the normal y = SIGMA · ROOT · z, of which the ratio is E|y| / sd(y)."""
 
@@ -55,9 +54,10 @@ def numbers(kind, x):
     return kinds.get(kind, x)
 
 
-def estimated(statistic, x, y, known, *converged):
+def estimated(statistic, x, y, known, converged=None):
     """The estimate of numbers (R, k) of calibrations and of linear theory."""
-    return controlled(statistic, Sample.of(x.T), Sample.of(y.T), np.asarray(known), *converged)
+    converged = np.ones(len(y), bool) if converged is None else converged
+    return controlled(statistic, x.T, y.T, np.asarray(known), converged)
 
 
 def samples(n, apart, kind, seeds=OFTEN):
@@ -77,9 +77,9 @@ def samples(n, apart, kind, seeds=OFTEN):
 def expected(kind, apart):
     """The statistics of x."""
     wider = np.hypot(1, apart)
-    correlation = np.array([0.6, 0.0, -0.3]) / wider**2
+    rho = np.array([0.6, 0.0, -0.3]) / wider**2
     share = np.full(3, 2 * stats.norm.cdf(stats.norm.ppf(0.975) / wider) - 1)
-    of = {"sd": SIGMA * wider, "rms": SIGMA * wider, "correlation": correlation, "share": share}
+    of = {"sd": SIGMA * wider, "rms": SIGMA * wider, "correlation": rho, "share": share}
     return of.get(kind, KNOWN[kind][1])
 
 
@@ -101,20 +101,11 @@ def test_every_statistic_is_as_far_off_as_it_states(kind, n, apart):
         assert np.median(gains) > 0.1 / apart**2
 
 
-def test_samples_that_follow_each_other_add_up():
-    x = 1e6 + np.random.default_rng(1).standard_normal((3, 1000))
-    whole, together = Sample.of(x), Sample.of(x[:, :300]) + Sample.of(x[:, 300:])
-    assert together.count == 1000
-    np.testing.assert_allclose(together.mean, whole.mean, rtol=1e-14)
-    np.testing.assert_allclose(together.products, whole.products, atol=1e-6)
-    np.testing.assert_allclose(together.sd, x.std(axis=1, ddof=1), rtol=1e-9)
-
-
 def test_a_mean_is_that_of_the_regression_on_linear_theory():
     rng = np.random.default_rng(2)
     y = rng.standard_normal((400, 1))
     x = 0.8 * y + 0.1 * rng.standard_normal((400, 1)) + 0.3
-    found = estimated(MEAN, x, y, np.zeros(1))
+    found = estimated(mean, x, y, np.zeros(1))
     slope = np.cov(x[:, 0], y[:, 0])[0, 1] / y.var(ddof=1)
     assert found.value[0] == pytest.approx((x - slope * y).mean(), rel=1e-9)
     assert found.error[0] == pytest.approx((x - slope * y).std(ddof=1) / 20, rel=0.01)
@@ -125,18 +116,18 @@ def test_what_linear_theory_does_not_know_stays_plain():
     rng = np.random.default_rng(3)
     x = 1 + 0.1 * rng.standard_normal((50, 2))
     for theory, known in ((x, [np.nan, np.nan]), (np.ones((50, 2)), [1.0, 1.0])):
-        found = estimated(MEAN, x, theory, known)
+        found = estimated(mean, x, theory, known)
         assert (found.gain == 1).all()
         np.testing.assert_allclose(found.value, x.mean(axis=0))
         np.testing.assert_allclose(found.error, x.std(axis=0, ddof=1) / np.sqrt(50))
-    assert (estimated(MEAN, x[:19], x[:19], np.ones(2)).gain == 1).all()
+    assert (estimated(mean, x[:19], x[:19], np.ones(2)).gain == 1).all()
 
 
-@pytest.mark.parametrize("statistic", [MEAN, SD])
+@pytest.mark.parametrize("statistic", [mean, sd])
 def test_failures_that_hang_on_the_noise_are_no_bias(statistic):
     """What fails is what would have been large: the statistic of the rest is not that of all."""
     truncated = stats.truncnorm(-np.inf, 1.5)
-    true, known = {MEAN: (truncated.mean(), 0.0), SD: (truncated.std(), 1.0)}[statistic]
+    true, known = {mean: (truncated.mean(), 0.0), sd: (truncated.std(), 1.0)}[statistic]
     values, errors = [], []
     for seed in range(OFTEN):
         rng = np.random.default_rng(seed)
@@ -164,7 +155,7 @@ def test_quantiles_of_a_normal_sum(apart):
     for _ in range(OFTEN):
         y = rng.standard_normal(1000)
         x = y + apart * rng.standard_normal(1000)
-        found = controlled_quantiles(levels, x, y, known)
+        found = controlled_quantiles(levels, x, y, known, np.ones(1000, bool))
         z.append((found.value - known * np.hypot(1, apart)) / found.error)
         gains.append(found.gain)
     rms = np.sqrt(np.mean(np.square(z), axis=0))

@@ -202,4 +202,4 @@ def test_sigmas_that_no_weights_span_are_said():
 
 def test_a_job_asks_for_the_memory_of_its_largest_cell():
     cells = make_cells(grid(replicates=20_000), grid(schemes="rings-24", replicates=10)).values()
-    assert memory([*cells]) == 1000 + round(60e-6 * 20_000 * 9)
+    assert memory([*cells]) == 1000 + round(150e-6 * 20_000 * 9)
