@@ -19,7 +19,6 @@ import pandas as pd
 
 from accelstudy.approaches import get_approach
 from accelstudy.campaign.calibration.fit import fit_campaign
-from accelstudy.campaign.calibration.sensor_calibration import affine_form
 from accelstudy.campaign.importing.logs import import_log
 from accelstudy.campaign.importing.public import import_settings, public_file
 from accelstudy.campaign.session import Campaign
@@ -77,7 +76,7 @@ def ours(campaign, model, approach="gravity"):
 
 def affine(fit):
     """K and b of f = K (reading − b)."""
-    return affine_form(fit.model, fit.parameters)
+    return fit.model.affine(fit.parameters)
 
 
 def left(k, b, forces):

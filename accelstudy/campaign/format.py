@@ -14,25 +14,22 @@ import numpy as np
 import yaml
 from numpy.typing import NDArray
 
-from accelstudy.basics.errors import InputError
+from accelstudy.basics.errors import InputError, brief
 from accelstudy.basics.units import MGON
 from accelstudy.basics.wording import one_line
 from accelstudy.campaign.gross_errors.recognition import check_plausible
-from accelstudy.campaign.header import COLUMNS, HEADER, KNOWN, MAX_CELL, TABLE, Header
+from accelstudy.campaign.header import COLUMNS, HEADER, KNOWN, TABLE, Columns, Header
 from accelstudy.campaign.session import Campaign
 from accelstudy.files.outputs import whole_file
 from accelstudy.files.reading import overlay, read_layer, read_text
 from accelstudy.files.validation import validate
-from accelstudy.leveling.angles import usual_norm
 
 Array = NDArray[np.float64]
-Columns = Mapping[str, Sequence[Any]]
+Table = Mapping[str, Sequence[Any]]
 """The table of positions by name: texts of its file, or numbers that are to be written."""
 
 MOST_NAMED = 5
 """Largest number of unknown columns with a warning each."""
-MAX_GRAVITIES = 1000
-"""Multiple of gravity beyond which a mean is no measurement."""
 _OF_HEADER = {
     "name": "name",
     "sensor": "sensor",
@@ -92,7 +89,7 @@ def read_header(folder: Path, given: Mapping[str, Any] | None = None) -> Header:
     return validate(Header, overlay(read_layer(path), given or {}), path)
 
 
-def read_positions(path: Path) -> tuple[Columns, list[str]]:
+def read_positions(path: Path) -> tuple[Table, list[str]]:
     """Read the columns of a table, and warnings about them.
 
     Raises
@@ -105,54 +102,52 @@ def read_positions(path: Path) -> tuple[Columns, list[str]]:
     try:
         text = read_text(path)
     except UnicodeDecodeError as error:
-        raise _not_whole(path, error) from None
+        raise InputError(f"{path}: not a CSV file in UTF-8 ({error.reason})") from None
     columns, warnings = columns_of(text, path), []
     # Half a number is a number, too: if the file was cut there, only the line end is missing.
-    if not text.endswith(("\n", "\r")):
+    if not text.endswith("\n"):
         warnings = [f"{path}: the last line does not end; check that it is whole"]
     return columns, warnings + ignored_in(columns, path)
 
 
-def ignored_in(columns: Columns, path: Path) -> list[str]:
+def ignored_in(columns: Table, path: Path) -> list[str]:
     """Warnings about columns that the format does not know."""
     unknown = [name for name in columns if name not in KNOWN]
-    if len(unknown) > MOST_NAMED:
-        first = ", ".join(one_line(repr(name), 30) for name in unknown[:MOST_NAMED])
-        return [f"{path}: {len(unknown)} columns are not known and ignored: {first}, …"]
-    said = []
-    for name in unknown:
-        near = get_close_matches(name[:100], KNOWN, n=1)
-        hint = f"; did you mean {near[0]!r}?" if near else ""
-        said.append(f"{path}: column {one_line(repr(name))} is not known and ignored{hint}")
+    said = [
+        f"{path}: column {brief(name)} is not known and ignored{_hint(name, KNOWN)}"
+        for name in unknown[:MOST_NAMED]
+    ]
+    if more := len(unknown) - len(said):
+        said.append(f"{path}: {more} more columns are not known and ignored")
     return said
 
 
-def columns_of(text: str, path: Path) -> Columns:
+def _hint(name: str, known: Sequence[str]) -> str:
+    """Which of the known names may be meant."""
+    lower = {each.lower(): each for each in known}
+    near = get_close_matches(name[:100].lower(), lower, n=1)
+    return f"; did you mean {lower[near[0]]!r}?" if near else ""
+
+
+def columns_of(text: str, path: Path) -> Table:
     """Columns of the text of a CSV table; errors name `path`."""
     try:
         reader = csv.reader(io.StringIO(text, newline=""), skipinitialspace=True, strict=True)
         lines = [(reader.line_num, row) for row in reader if any(map(str.strip, row))]
     except csv.Error as error:
-        raise _not_whole(path, error) from None
+        raise InputError(f"{path}: not a whole CSV file ({one_line(error)})") from None
     if not lines:
         raise InputError(f"{path}: empty; expected a line of column names, position, fx, fy, fz …")
     names = [name.strip() for name in lines[0][1]]
-    if len(names) == 1 and (mark := next((m for m in ";\t" if m in names[0]), None)):
-        raise InputError(f"{path}: columns are separated by {mark!r}; a comma would be right")
+    if len(names) == 1:
+        raise InputError(f"{path}: one column, {brief(names[0])}; expected columns between commas")
     for line, row in lines[1:]:
         if len(row) != len(names):
-            raise InputError(
-                f"{path}: line {line}: {len(row)} values for {len(names)} columns; "
-                "is the file whole?"
-            )
+            raise InputError(f"{path}: line {line}: {len(row)} values for {len(names)} columns")
     for name in names:
         if names.count(name) > 1:
             raise InputError(f"{path}: {name!r}: the column stands twice")
     return {name: [row[i] for _, row in lines[1:]] for i, name in enumerate(names)}
-
-
-def _not_whole(path: Path, error: Exception) -> InputError:
-    return InputError(f"{path}: not a whole CSV file in UTF-8 ({one_line(error)})")
 
 
 def write_campaign(campaign: Campaign, folder: str | Path, plausible: bool = True) -> None:
@@ -191,31 +186,24 @@ def write_campaign(campaign: Campaign, folder: str | Path, plausible: bool = Tru
         raise InputError(f"{folder}: cannot be written: {error.strerror or error}") from None
 
 
-def parse_table(columns: Columns, header: Header, path: Path, plausible: bool = True) -> Campaign:
+def parse_table(columns: Table, header: Header, path: Path, plausible: bool = True) -> Campaign:
     """Check the columns of the table `path`, and make a campaign of them and the header."""
-    given: dict[str, Array] = {}
-    labels: list[str] = []
-    for attribute, column in COLUMNS.items():
-        names = column.names
-        if not (column.needed or {*names} & {*columns}):
-            continue
-        parts = [_numbers(columns, name, labels, path) for name in names]
-        if attribute == "positions":
-            labels = [f"position {value:.15g}" for value in parts[0]]
-        for name, part in zip(names, parts, strict=True):
-            _check_column(attribute, name, part, labels, path)
-        given[attribute] = np.column_stack(parts) if len(parts) > 1 else parts[0]
-    _check_robot(given, header, path)
+    if not any(map(len, columns.values())):
+        raise InputError(f"{path}: no positions; expected one row per hold")
+    rows = [f"row {i}" for i in range(1, 1 + max(map(len, columns.values())))]
     values: dict[str, Any] = {}
-    with np.errstate(all="ignore"):  # the checks below find what overflows
-        for attribute, array in given.items():
-            values[attribute] = header.conversion(attribute).to_si(array)
-    _check_forces(values["forces"], header, path, labels, plausible)
+    for attribute, column in COLUMNS.items():
+        if not (column.needed or {*column.names} & {*columns}):
+            continue
+        parts = [_numbers(columns, name, column, rows, path) for name in column.names]
+        if attribute == "positions":
+            rows = [f"position {value:.0f}" for value in parts[0]]
+        array = np.column_stack(parts) if parts[1:] else parts[0]
+        array = header.conversion(attribute).to_si(array)
+        values[attribute] = array.astype(np.int64) if column.whole else array
+    _check_together(values, header, path)
     if header.robot is not None:
-        values.setdefault("yaw", np.zeros(len(labels)))
-    for attribute, array in values.items():
-        if COLUMNS[attribute].whole:
-            values[attribute] = array.astype(np.int64)
+        values.setdefault("yaw", np.zeros(len(rows)))
     campaign = campaign_of(header, values)
     if plausible:
         check_plausible(campaign, f"{path.with_name(HEADER)} and {path.name}")
@@ -226,65 +214,61 @@ def parse_table(columns: Columns, header: Header, path: Path, plausible: bool = 
         raise InputError(f"{path.with_name(HEADER)}: {error}") from None
 
 
-def _check_column(
-    attribute: str, name: str, values: Array, labels: Sequence[str], path: Path
-) -> None:
-    """Check what must hold for a column in any unit."""
+def _numbers(columns: Table, name: str, column: Columns, rows: Sequence[str], path: Path) -> Array:
+    """Numbers of a column, checked; errors name the row."""
+    if name not in columns:
+        rest = ", ".join(other for other in column.names if other != name)
+        group = f" (it goes with {rest})" if rest else ""
+        others = [other for other in columns if other not in KNOWN]
+        raise InputError(f"{path}: {name}: the column is missing{group}{_hint(name, others)}")
+    values = np.array([*map(_number, columns[name])])
 
-    def complain_of(wrong: NDArray[np.bool_], text: str) -> None:
+    def refuse(wrong: NDArray[np.bool_], text: str) -> None:
         if wrong.any():
             i = int(np.argmax(wrong))
-            raise InputError(f"{path}: {name}: {labels[i]}: {values[i]:.15g} {text}")
+            raise InputError(f"{path}: {name}: {rows[i]}: {brief(columns[name][i])} {text}")
 
-    column = COLUMNS[attribute]
+    refuse(~np.isfinite(values), "is no number, such as -9.81; leave out a hold without a mean")
+    for i in np.flatnonzero((values < column.within.least) | (values > column.within.most))[:1]:
+        column.within.check_key(f"{path}: {name}: {rows[i]}", values[i])
     if column.whole:
-        complain_of(values % 1 != 0, "is no whole number")
-    within = column.within
-    for i in np.flatnonzero((values < within.least) | (values > within.most))[:1]:
-        within.check_key(f"{path}: {name}: {labels[i]}", values[i])
+        refuse(values % 1 != 0, "is no whole number")
     behind = np.diff(values, prepend=-np.inf)
-    if attribute == "positions":
-        text = "follows no smaller number; number the holds 1, 2, 3 … in order of acquisition"
-        complain_of(behind <= 0, text)
-    if attribute == "time":
-        complain_of(behind < 0, "is before the hold above; rows must be in order of acquisition")
-    if attribute == "forces" and len(values) > 1 and np.ptp(values) == 0:
+    if name == "position":
+        refuse(behind <= 0, "follows no smaller number; number the holds 1, 2, 3 … as acquired")
+    if name == "time_s":
+        refuse(behind < 0, "is before the hold above; rows must be in order of acquisition")
+    return values
+
+
+def _number(cell: Any) -> float:
+    """Number of a cell; NaN if it is none. Python would also take 1_0 for one."""
+    try:
+        return float(str(cell).replace("_", "?"))
+    except ValueError:
+        return np.nan
+
+
+def _check_together(values: Mapping[str, Array], header: Header, path: Path) -> None:
+    """Check that every channel works, and that angles and their sigma come together."""
+    for name, channel in zip(COLUMNS["forces"].names, values["forces"].T, strict=True):
+        if len(channel) > 1 and np.ptp(channel) == 0:
+            raise InputError(
+                f"{path}: {name}: the same in all positions; a channel that works changes"
+            )
+    angles = " and ".join(COLUMNS["angles"].names)
+    if "angles" not in values:
+        if "yaw" in values:
+            raise InputError(f"{path}: yaw_robot_gon: goes with {angles}, which are missing")
+        for key in ("robot", "reference"):
+            if getattr(header, key) is not None:
+                raise InputError(
+                    f"{path.with_name(HEADER)}: {key}: is given, but {path.name} has no {angles}"
+                )
+    elif header.robot is None and header.reference is None:
         raise InputError(
-            f"{path}: {name}: {values[0]:.15g} in all positions; a channel that works changes"
-        )
-
-
-def _check_robot(given: Mapping[str, Array], header: Header, path: Path) -> None:
-    """Check that angles and their sigma come together."""
-    roll, pitch = COLUMNS["angles"].names
-    key = f"{path.with_name(HEADER)}: robot.angle_sigma_mgon"
-    if "yaw" in given and "angles" not in given:
-        raise InputError(f"{path}: yaw_robot_gon: goes with {roll} and {pitch}, which are missing")
-    if header.reference is not None:
-        key = f"{path.with_name(HEADER)}: reference"
-    elif "angles" in given and header.robot is None:
-        raise InputError(f"{key}: missing, but {path.name} has {roll} and {pitch}")
-    if (header.robot or header.reference) is not None and "angles" not in given:
-        raise InputError(f"{key}: is given, but {path.name} has no {roll} and {pitch}")
-
-
-def _check_forces(
-    forces: Array, header: Header, path: Path, labels: Sequence[str], plausible: bool
-) -> None:
-    """Check that forces (n, 3), m/s², can be calculated with and, if asked, that none is absurd."""
-    where, gravity = f"{path}: fx, fy, fz", header.gravity.value_mps2
-    norm = usual_norm(forces)
-    if not (norm > 1 / MAX_CELL and np.max(abs(forces)) < MAX_CELL):
-        raise InputError(
-            f"{where}: their norm is about {norm:.3g} m/s², which no unit makes gravity, "
-            f"{gravity:g} m/s²; correct the columns"
-        )
-    absurd = np.linalg.norm(forces, axis=1) > MAX_GRAVITIES * max(gravity, norm)
-    if plausible and absurd.any():
-        label = labels[int(np.argmax(absurd))]
-        raise InputError(
-            f"{where}: {label}: more than {MAX_GRAVITIES} times gravity; "
-            "correct the mean, or leave out the hold"
+            f"{path.with_name(HEADER)}: robot.angle_sigma_mgon: missing, but {path.name} has "
+            f"{angles}"
         )
 
 
@@ -308,35 +292,6 @@ def campaign_of(header: Header, values: Mapping[str, Any]) -> Campaign:
         resolution=None if header.resolution_mps2 is None else np.array(header.resolution_mps2),
         **values,
     )
-
-
-def _numbers(columns: Columns, name: str, labels: Sequence[str], path: Path) -> Array:
-    """Column of finite numbers; `labels` name its rows in errors."""
-    if name not in columns:
-        lower = {other.lower(): other for other in columns if other not in KNOWN}
-        near = get_close_matches(name.lower(), lower, n=1)
-        hint = f"; is {lower[near[0]]!r} meant?" if near else ""
-        beside = next((c.names for c in COLUMNS.values() if name in c.names), ())
-        group = f" (it goes with {', '.join(n for n in beside if n != name)})" if beside[1:] else ""
-        raise InputError(f"{path}: {name}: the column is missing{group}{hint}")
-    values = columns[name]
-    if not len(values):
-        raise InputError(f"{path}: no positions; expected one row per hold")
-    numbers = np.empty(len(values))
-    for i, value in enumerate(values):
-        where = f"{path}: {name}: {labels[i] if labels else f'row {i + 1}'}"
-        if value == "":
-            raise InputError(f"{where}: empty; expected a number")
-        try:
-            if "_" in str(value):
-                raise ValueError
-            numbers[i] = float(value)
-        except ValueError:
-            shown = one_line(repr(value), 60)
-            raise InputError(f"{where}: {shown} is no number, such as -9.81") from None
-        if not np.isfinite(numbers[i]):
-            raise InputError(f"{where}: {value} is not finite; leave out a hold that has no mean")
-    return numbers
 
 
 def _content_of(campaign: Campaign) -> dict[str, Any]:

@@ -258,7 +258,7 @@ def usable_reference(path: Path) -> SensorCalibration:
             f"{where}: it has no covariance matrix, so nothing tells how far its angles can be "
             "trusted; calibrate it in more positions than its model has parameters"
         )
-    for effect, condition in calibration.needs:
+    for effect, condition in calibration.model.needs:
         raise InputError(
             f"{where}: its effect {effect} needs the {condition} of each hold; give a "
             "calibration with a model that needs the forces only (calibrate --model)"

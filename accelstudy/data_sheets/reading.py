@@ -10,11 +10,12 @@ from importlib.resources import files
 from pathlib import Path
 from typing import Any
 
+from accelstudy.basics.bounds import Range
 from accelstudy.basics.errors import InputError, UnknownNameError, brief
 from accelstudy.basics.plugins import error_as_line, installed_entry_points, label
 from accelstudy.basics.units import parse_quantity
 from accelstudy.campaign.sensor_type import TYPE_KEYS
-from accelstudy.data_sheets.sheet import LEAST_FULL_SCALE, MOST, QUANTITIES, DataSheet
+from accelstudy.data_sheets.sheet import MOST, QUANTITIES, DataSheet
 from accelstudy.files.reading import read_layer
 
 TEXTS = ("name", "title", "source")
@@ -22,6 +23,9 @@ LOGS = (".csv", ".txt", ".gz", ".mat", ".parquet", ".log", ".dat")
 """Endings of files that are no data sheets, though one can be made of them."""
 DENSITY = "noise_density"
 """Another way to write the white noise: the one-sided density of most data sheets."""
+NOISE = (DENSITY, "velocity_random_walk", "position_sigma")
+LEAST = {"full_scale": 1.0, **dict.fromkeys(NOISE, 1e-12)}
+"""Smallest values, SI, of quantities that cannot be 0."""
 
 
 def data_sheet_names() -> tuple[str, ...]:
@@ -121,13 +125,7 @@ def _quantity(key: str, given: Any) -> tuple[float, str]:
         size = parse_quantity(str(text), unit)
     except InputError as error:
         raise InputError(f"{key}: {error}") from None
-    if size < 0 or (size == 0 and key in (DENSITY, "velocity_random_walk", "position_sigma")):
-        raise InputError(f"{key}: must be more than 0, not {brief(text)}")
-    if size > MOST[unit] or (key == "full_scale" and size < LEAST_FULL_SCALE):
-        bound = f"at most {MOST[unit]:g} {unit}"
-        if size <= MOST[unit]:
-            bound = f"at least {LEAST_FULL_SCALE:g} {unit}"
-        raise InputError(f"{key}: must be {bound}, not {brief(text)}")
+    Range(LEAST.get(key, 0.0), MOST[unit], unit).check_key(key, size)
     return size, where
 
 

@@ -45,8 +45,6 @@ MOST = {
     "rad": 1.0,
 }
 """Largest value of a quantity by its unit; beyond it nothing is a sensor for leveling."""
-LEAST_FULL_SCALE = 1.0
-"""m/s²."""
 FLICKER = math.sqrt(2 * math.log(2) / math.pi)
 """Floor of the Allan deviation in parts of the bias instability B, 0.664 (IEEE Std 952)."""
 

@@ -1,4 +1,4 @@
-"""The glossary: the terms of the pages, explained by hovering and at the foot of each page."""
+"""The glossary: the terms of the pages, explained at the foot of each page that uses them."""
 
 from __future__ import annotations
 
@@ -44,44 +44,16 @@ TERMS = {
 }
 """Terms in alphabetical order; a page explains those that it uses."""
 
-FORMS = {
-    "a-priori": "a priori",
-    "held out": "held-out",
-    "misclosures": "misclosure",
-    "p-values": "p-value",
-    "posterior": "posterior probability",
-    "redundant": "redundancy",
-    "residuals": "residual",
-    "signatures": "signature",
-}
-"""Other forms of the terms."""
-
-_KNOWN = {**{term.lower(): term for term in TERMS}, **FORMS}
-_WORD = re.compile(
-    rf"(?<!\w)({'|'.join(map(re.escape, sorted(_KNOWN, key=len, reverse=True)))})(?!\w)",
-    re.IGNORECASE,
-)
-_APART = re.compile(r"(<(svg|style|script|select|title|pre|code|a)\b.*?</\2>|<[^>]*>)", re.DOTALL)
+_NO_PROSE = re.compile(r"<(svg|style|script|select|title|pre|code|a)\b.*?</\1>|<[^>]*>", re.DOTALL)
 
 
 def explain_terms(page: str) -> str:
-    """Explain the terms of a page: at their first use by hovering, and all of them at its foot.
-
-    Figures, links and commands stay unchanged. A page without the mark `FOOT` gets no list.
-    """
-    used: dict[str, str] = {}
-
-    def mark(match: re.Match[str]) -> str:
-        term = _KNOWN[match[0].lower()]
-        if term in used:
-            return match[0]
-        used[term] = escape(TERMS[term])
-        return f'<abbr title="{used[term]}">{match[0]}</abbr>'
-
-    parts, end = [], 0
-    for apart in _APART.finditer(page):
-        parts += [_WORD.sub(mark, page[end : apart.start()]), apart[0]]
-        end = apart.end()
-    text = "".join([*parts, _WORD.sub(mark, page[end:])])
-    terms = "".join(f"<dt>{term}</dt><dd>{used[term]}</dd>\n" for term in TERMS if term in used)
-    return text.replace(FOOT, f"<h2>Terms</h2>\n<dl>\n{terms}</dl>" if used else "")
+    """Explain the terms of a page at its foot, where its mark is."""
+    prose = _NO_PROSE.sub(" ", page)
+    forms = {term: re.sub(r"\\?[ -]", "[ -]", re.escape(term)) for term in TERMS}
+    used = [
+        f"<dt>{term}</dt><dd>{escape(TERMS[term])}</dd>\n"
+        for term, form in forms.items()
+        if re.search(rf"(?<!\w){form}s?(?!\w)", prose, re.IGNORECASE)
+    ]
+    return page.replace(FOOT, f"<h2>Terms</h2>\n<dl>\n{''.join(used)}</dl>" if used else "")

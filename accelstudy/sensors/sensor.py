@@ -110,6 +110,39 @@ class SensorModel:
                 names |= {"temperature", "time"} if tau > 0 else {"temperature"}
         return tuple(name for name in HoldConditions.columns() if name in names)
 
+    @cached_property
+    def needs(self) -> tuple[tuple[str, str], ...]:
+        """Effects that need more than the force, each with a column of `HoldConditions`."""
+        if not self.hold_columns:
+            return ()
+        alone = (SensorModel("", (effect,)) for effect in self.effects)
+        return tuple((one.effects[0].name, column) for one in alone for column in one.hold_columns)
+
+    @property
+    def without_rig(self) -> SensorModel:
+        """The model without the effects of the rig, which stay with it."""
+        return SensorModel(self.name, tuple(e for e in self.effects if e.part == "sensor"))
+
+    def affine(
+        self, parameters: ArrayLike
+    ) -> tuple[NDArray[np.float64], NDArray[np.float64]] | None:
+        """K (3, 3) and b (3,) of f_b = K (f_s − b); None if the model is not affine.
+
+        Effects of the rig are left out: they are no part of the sensor.
+
+        Parameters
+        ----------
+        parameters : (u,) array, SI
+        """
+        if not_affine(self):
+            return None
+        probes = STANDARD_GRAVITY * np.concatenate([np.zeros((1, 3)), np.eye(3), -np.eye(3)])
+        corrected = self.without_rig.correct(probes, np.asarray(parameters)[self.stays])
+        if not np.isfinite(corrected).all():
+            return None
+        matrix = ((corrected[1:4] - corrected[4:]) / (2 * STANDARD_GRAVITY)).T
+        return matrix, -np.linalg.solve(matrix, corrected[0])
+
     def sense(
         self,
         f_b: ArrayLike,

@@ -13,7 +13,7 @@ from accelstudy.approaches import Approach, get_approach
 from accelstudy.basics import suggestions
 from accelstudy.basics.errors import InputError
 from accelstudy.basics.levels import IMPLAUSIBLE, REJECTED
-from accelstudy.campaign.calibration.assessment import Assessment, assess, tilt_left
+from accelstudy.campaign.calibration.assessment import Assessment, tilt_left
 from accelstudy.campaign.calibration.fit import (
     CampaignFit,
     angle_errors,
@@ -238,7 +238,7 @@ def _assessed(campaign: Campaign, model: SensorModel, approach: Approach) -> Ass
     if not campaign.n_positions:
         return None
     try:
-        return assess(fit_campaign(campaign, model, approach))
+        return Assessment(fit_campaign(campaign, model, approach))
     except InputError:  # it is not determined yet, or does not converge
         return None
 

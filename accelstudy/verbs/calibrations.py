@@ -66,13 +66,11 @@ def read_calibration(path: str | PathLike[str]) -> Calibration:
     InputError
         If there is no such file, or it is not a calibration.
     """
-    from accelstudy.campaign.calibration import sensor_calibration
+    from accelstudy.basics.arguments import path_of
     from accelstudy.campaign.calibration.result import Calibration
+    from accelstudy.campaign.calibration.sensor_calibration import read_calibration as read
 
-    file = sensor_calibration.file_of(path, "path")
-    content = sensor_calibration.read_calibration_content(file)
-    sensor_calibration.calibration_of(content, f"{file}: {sensor_calibration.NO_CALIBRATION}")
-    return Calibration(None, {"warnings": [], **content})
+    return Calibration(None, read(path_of("path", path)).content)
 
 
 @verb

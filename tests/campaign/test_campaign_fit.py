@@ -8,9 +8,8 @@ from campaign_helpers import FIVE_AXES, simulated_campaign
 from usual import GRAVITY, NINE, ROBOT
 
 from accelstudy.basics.errors import InputError
-from accelstudy.campaign.calibration.assessment import assess
+from accelstudy.campaign.calibration.assessment import Assessment
 from accelstudy.campaign.calibration.fit import fit_campaign, initial_values
-from accelstudy.campaign.calibration.sensor_calibration import affine_form
 from accelstudy.campaign.calibration.wording import verdict_lines
 from accelstudy.campaign.session import Campaign
 from accelstudy.schemes import get_scheme
@@ -47,7 +46,7 @@ def test_a_robot_is_needed_for_the_robot_approach():
 
 def test_a_nonlinear_model_has_no_matrix():
     model = get_model("bias-scale-nonorthogonality-quadratic")
-    assert affine_form(model, model.vector({"k2_x": 1e-3})) is None
+    assert model.affine(model.vector({"k2_x": 1e-3})) is None
 
 
 @pytest.mark.parametrize(("bumped", "said"), [
@@ -59,7 +58,7 @@ def test_positions_in_conflict_are_not_blamed_alone(bumped, said):
     """A bumped hold stands out, and so do those after a knock of the mounting."""
     measured = simulated_campaign({"b_x": 0.1}, seed=2)
     measured.forces[bumped] *= np.array([[1.01], [0.994], [1.003]])[: len(bumped)]
-    lines = verdict_lines(assess(fit_campaign(measured, NINE, GRAVITY)))
+    lines = verdict_lines(Assessment(fit_campaign(measured, NINE, GRAVITY)))
     found = [line for line in lines if line.startswith("In conflict")]
     assert len(found) == bool(bumped)
     assert ("“accelstudy diagnose” looks for what is wrong or missing." in lines) == bool(bumped)

@@ -46,7 +46,7 @@ def test_usual_wrong_units_are_refused(wrong, tmp_path):
 
 def test_other_checks_stay_without_plausibility(tmp_path):
     broken = replace(CLEAN, forces=np.where(np.arange(3) == 1, np.nan, CLEAN.forces))
-    with pytest.raises(InputError, match="fy: position 1: nan is not finite"):
+    with pytest.raises(InputError, match="fy: position 1: nan is no number"):
         write_campaign(broken, tmp_path, plausible=False)
 
 
@@ -115,7 +115,7 @@ def test_exchanged_rows_are_recognised_and_put_back(design, designs):
         found = recognise(campaign)
         assert found is not None, (design, wrong)
         assert found.name == "row_order"
-        assert found.reason.endswith(" and 40 more are exchanged") == (len(wrong) > 40)
+        assert (", … are exchanged" in found.reason) == (len(wrong) > 40)
         # Which of two repeats is which does not show, and is all the same.
         assert np.abs(found.corrected.forces - right.forces).max() < 0.06, (design, wrong)
 
@@ -127,10 +127,11 @@ COUNTS = {
 }
 
 
+@pytest.mark.parametrize("robot", [True, False])
 @pytest.mark.parametrize("differ", COUNTS)
 @pytest.mark.parametrize("columns", [(1, 0, 2), (2, 1, 0), (1, 2, 0)])
-def test_columns_of_counts_are_exchanged_before_their_scales_and_offsets(differ, columns):
-    """It ended in "does not converge", or in scales that are wrong by 30 %."""
+def test_columns_of_counts_are_exchanged_before_their_scales_and_offsets(differ, columns, robot):
+    """It ended in "does not converge", or in scales and biases that no sensor has."""
     nominal = Conversion(*map(np.array, COUNTS[differ]))
     ideal = -9.80665 * get_scheme("faces-edges-corners-26").directions
     noise = 0.002 * np.random.default_rng(36).standard_normal(ideal.shape)
@@ -139,7 +140,7 @@ def test_columns_of_counts_are_exchanged_before_their_scales_and_offsets(differ,
     read = Campaign(
         **{"name": "counts", "positions": np.arange(1, 27), "forces": nominal.to_si(counts)},
         **{"gravity": 9.80665, "sigma_force": 0.002, "unit": "counts", "nominal": nominal},
-        **{"angles": angles_of(ideal), "sigma_angle": 5e-5},
+        **({"angles": angles_of(ideal), "sigma_angle": 5e-5} if robot else {}),
     )
     found = recognise(read)
     assert re.match("axes are swapped: . is read as .*, in the counts, before", found.reason)
@@ -205,9 +206,7 @@ def test_a_position_that_no_calibration_bears_is_left_out(approach, size):
 def test_of_many_wrong_positions_the_first_are_named():
     campaign = acs.simulate_campaign(scheme="fibonacci-200", seed=12, approach="gravity")
     campaign.forces[::9] *= 1.5
-    with pytest.raises(
-        InputError, match=r"23 positions \(1, 10, .*, 172, …\) are wrong by up to"
-    ) as e:
+    with pytest.raises(InputError, match=r"positions 1, 10, .*, 172, … are wrong by up to") as e:
         acs.calibrate(campaign)
     assert len(str(e.value)) < 400
 

@@ -15,7 +15,7 @@ from places import ROOT
 from accelstudy.adjustment import calibrate
 from accelstudy.approaches import get_approach
 from accelstudy.basics.units import GON, MGON
-from accelstudy.campaign.calibration.assessment import assess
+from accelstudy.campaign.calibration.assessment import Assessment
 from accelstudy.campaign.calibration.fit import fit_campaign
 from accelstudy.campaign.format import read_campaign
 from accelstudy.campaign.session import Campaign
@@ -193,7 +193,7 @@ def test_it_judges_as_the_calibration_does(begun, n, bumped):
     advice = advice_for(
         measured, get_model(MODEL), get_approach("gravity"), promise, candidate_positions("cube")
     )
-    calibrated = assess(fit_campaign(measured, get_model(MODEL), get_approach("gravity")))
+    calibrated = Assessment(fit_campaign(measured, get_model(MODEL), get_approach("gravity")))
     assert (
         advice.calibration_state
         == calibrated.state
@@ -226,7 +226,7 @@ def test_it_never_says_enough_where_the_calibration_is_rejected():
             forces = drawn.forces[0, :n]
             campaign = Campaign("s", np.arange(1, n + 1), forces, 9.80665, sigma_force=sigma)
             advice = advice_for(campaign, model, by, promise, directions)
-            state = assess(fit_campaign(campaign, model, by)).state
+            state = Assessment(fit_campaign(campaign, model, by)).state
             assert advice.calibration_state == state
             assert not (advice.enough and state in ("rejected", "implausible"))
             seen.append((state == "rejected", advice.enough))

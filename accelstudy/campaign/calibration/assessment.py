@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -52,34 +53,65 @@ class TiltLeft:
         return np.hypot(self.parameters, self.missing)
 
 
-@dataclass(frozen=True)
 class Assessment:
-    """Quality of a calibrated campaign.
+    """Quality of a calibrated campaign; each part is computed when it is asked for.
 
-    Attributes
+    Parameters
     ----------
     fit : CampaignFit
-    solution : quality.Solution, linearised at the estimates
-    tests, reliability : of the positions
-    suspects : positions in conflict with the others, removed one at a time
-    held_out : prediction of each position from the others; None where those do not determine the
-        model
-    components : variance components of accelerometer and robot; None without a robot
-    tilt : TiltLeft, the tilt error that is left
-    implausible : tuple of str, parameters and tilt errors that no sensor has
-    gross_error : Recognition or None, in the campaign, its robot's angles included
     """
 
-    fit: CampaignFit
-    solution: quality.Solution
-    tests: quality.PositionTests
-    reliability: quality.Reliability
-    suspects: tuple[quality.Suspect, ...]
-    held_out: quality.HeldOut | None
-    components: VarianceComponents | None
-    tilt: TiltLeft
-    implausible: tuple[str, ...]
-    gross_error: Recognition | None
+    def __init__(self, fit: CampaignFit) -> None:
+        self.fit = fit
+        self._session = fit.model, fit.approach, fit.observed
+
+    @property
+    def solution(self) -> quality.Solution:
+        """The adjustment, linearised at the estimates."""
+        return self.fit.solution
+
+    @cached_property
+    def tests(self) -> quality.PositionTests:
+        """Tests of the positions."""
+        return quality.position_tests(self.solution)
+
+    @cached_property
+    def reliability(self) -> quality.Reliability:
+        """Reliability of the positions."""
+        return quality.reliability(self.solution)
+
+    @cached_property
+    def suspects(self) -> tuple[quality.Suspect, ...]:
+        """Positions in conflict with the others, removed one at a time."""
+        known = self.fit.trusts_sigma
+        return quality.suspects(*self._session, alpha=OUTLIER_LEVEL, sigma_known=known)
+
+    @cached_property
+    def held_out(self) -> quality.HeldOut | None:
+        """Prediction of each position from the others; None where those do not determine it."""
+        return quality.held_out(self.solution)
+
+    @cached_property
+    def components(self) -> VarianceComponents | None:
+        """Variance components of accelerometer and robot; None without a robot."""
+        return variance_components(*self._session) if self.fit.sigma_known else None
+
+    @cached_property
+    def tilt(self) -> TiltLeft:
+        """The tilt error that is left."""
+        return tilt_left(self.fit)
+
+    @cached_property
+    def implausible(self) -> tuple[str, ...]:
+        """Parameters and tilt errors that no sensor has."""
+        fit = self.fit
+        parameters = implausible_parameters(fit.model.effects, fit.parameters, fit.sigma)
+        return *parameters, *implausible_tilt(*self.tilt.total)
+
+    @cached_property
+    def gross_error(self) -> Recognition | None:
+        """A gross error in the campaign; one of the angles shows even where they are not used."""
+        return recognise(self.fit.campaign)
 
     @property
     def p_adjusted(self) -> Array:
@@ -112,35 +144,6 @@ class Assessment:
         if test is not None and not test.accepted:
             return REJECTED
         return UNCHECKED if test is None or test.powerless else ACCEPTED
-
-
-def assess(fit: CampaignFit, without_gross_error: bool = False) -> Assessment:
-    """Assess a calibrated campaign.
-
-    Parameters
-    ----------
-    fit : CampaignFit
-    without_gross_error : bool, whether none was recognised in its campaign before
-    """
-    session = (fit.model, fit.approach, fit.observed)
-    solution = quality.solve(*session, fit.adjustment)
-    tilt = tilt_left(fit)
-    return Assessment(
-        fit=fit,
-        solution=solution,
-        tests=quality.position_tests(solution),
-        reliability=quality.reliability(solution),
-        suspects=quality.suspects(*session, alpha=OUTLIER_LEVEL, sigma_known=fit.trusts_sigma),
-        held_out=quality.held_out(solution),
-        components=variance_components(*session) if fit.sigma_known else None,
-        tilt=tilt,
-        implausible=(
-            *implausible_parameters(fit.model.effects, fit.parameters, fit.sigma),
-            *implausible_tilt(*tilt.total),
-        ),
-        # A gross error of the angles shows even where the fit does not use them.
-        gross_error=None if without_gross_error else recognise(fit.campaign),
-    )
 
 
 def tilt_left(fit: CampaignFit, max_tilt: float = MAX_TILT_GON * GON) -> TiltLeft:

@@ -21,7 +21,6 @@ from accelstudy.basics.units import MGON
 from accelstudy.campaign.calibration.sensor_calibration import (
     RANGE_MARGIN,
     SensorCalibration,
-    affine_form,
 )
 from accelstudy.effects import HoldConditions, get_effect
 from accelstudy.effects.base import expressions
@@ -70,7 +69,7 @@ def c_header(calibration: SensorCalibration, real: str = "float") -> str:
     whole = np.round(offset)
     linear = calibration.mending @ frame.matrix * raw.scale
     constant = linear @ (whole - offset)
-    if affine := affine_form(model, p):
+    if affine := model.affine(p):
         stages, (k, bias) = [], affine
         k = frame.matrix.T @ k
         output = []

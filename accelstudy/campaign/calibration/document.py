@@ -12,22 +12,28 @@ import pandas as pd
 
 from accelstudy.basics.units import MGON, recorded_unit, to_recorded
 from accelstudy.campaign.calibration.assessment import Assessment
-from accelstudy.campaign.calibration.fit import CampaignFit
-from accelstudy.campaign.calibration.sensor_calibration import FORCES, affine_form
+from accelstudy.campaign.calibration.sensor_calibration import FORCES
 from accelstudy.campaign.calibration.wording import verdict_lines
 from accelstudy.files.outputs import whole_file
 from accelstudy.leveling.error import MAX_TILT_GON
 from accelstudy.sensors.frames import FRD
 
 
-def calibration_document(fit: CampaignFit) -> dict[str, Any]:
-    """Describe a fit: parameters with sigmas, correlation, accuracy and matrix.
+def calibration_document(assessment: Assessment) -> dict[str, Any]:
+    """Describe a calibration: parameters with sigmas, correlation, accuracy, matrix and quality.
 
     All numbers are in SI but those whose key names another unit, and in forward, right, down.
     """
+    fit = assessment.fit
     campaign, adjustment = fit.campaign, fit.adjustment
     covariance, sigma = fit.covariance, fit.sigma
-    correlation = covariance / np.outer(sigma, sigma)
+    affine = fit.model.affine(fit.parameters)
+    ranged = {
+        "time_s": campaign.time,
+        "temperature_degC": campaign.temperature,
+        "vibration_mps2": campaign.vibration,
+        **dict(zip(FORCES, fit.corrected.T, strict=True)),
+    }
     content = {
         "schema_version": 1,
         "campaign": campaign.name,
@@ -75,32 +81,33 @@ def calibration_document(fit: CampaignFit) -> dict[str, Any]:
             for i, parameter in enumerate(fit.model.parameters)
         ],
         "covariance": covariance,
-        "correlation": correlation,
+        "correlation": covariance / np.outer(sigma, sigma),
         "condition": fit.estimability.condition,
         "redundancy": adjustment.redundancy,
         "variance_of_unit_weight": adjustment.variance_posteriori[0],
         "iterations": int(adjustment.iterations[0]),
         "rms_norm_residual_mps2": fit.rms_norm_residual,
-        "affine": _affine(fit),
+        "affine": affine and dict(zip(("matrix", "bias_mps2"), affine, strict=True)),
         "mended": None,
         "excluded": campaign.exclusions,
         "range_mps2": campaign.full_range,
-        "ranges": _ranges(fit),
+        "ranges": {k: [v.min(), v.max()] for k, v in ranged.items() if v is not None},
         "log": None if campaign.log is None else campaign.log.model_dump(exclude_none=True),
         "warnings": campaign.warnings,
+        "quality": _quality(assessment),
     }
-    return json_content(content)
+    return dict(json_content(content))
 
 
-def quality_document(assessment: Assessment) -> dict[str, Any]:
-    """Quality in plain data, for `calibration.json`."""
+def _quality(assessment: Assessment) -> dict[str, Any]:
+    """How good a calibration is."""
     held, test = assessment.held_out, assessment.fit.global_test
     components = assessment.components
     gross, tilt = assessment.gross_error, assessment.tilt
     angles = None if held is None else held.rms_angles
     parts = {"": tilt.total, "parameters_": tilt.parameters, "reference_": tilt.reference}
     positions = assessment.fit.campaign.positions
-    content = {
+    return {
         "state": assessment.state,
         "plausible": not assessment.warnings,
         "warnings": assessment.warnings,
@@ -145,7 +152,6 @@ def quality_document(assessment: Assessment) -> dict[str, Any]:
             "max_tilt_gon": MAX_TILT_GON,
         },
     }
-    return json_content(content)
 
 
 def assessed_positions(assessment: Assessment) -> pd.DataFrame:
@@ -180,41 +186,6 @@ def assessed_positions(assessment: Assessment) -> pd.DataFrame:
     return table
 
 
-def _ranges(fit: CampaignFit) -> dict[str, list[float]]:
-    """Smallest and largest value over the holds of a calibration.
-
-    Returns
-    -------
-    dict
-        Ranges of `time_s` since the start of the session, `temperature_degC`, `vibration_mps2` as
-        far as they are known, and of the calibrated forces.
-    """
-    campaign = fit.campaign
-    columns = {
-        "time_s": campaign.time,
-        "temperature_degC": campaign.temperature,
-        "vibration_mps2": campaign.vibration,
-        **dict(zip(FORCES, fit.corrected.T, strict=True)),
-    }
-    return {
-        name: [np.min(values), np.max(values)]
-        for name, values in columns.items()
-        if values is not None
-    }
-
-
-def _affine(fit: CampaignFit) -> dict[str, Any] | None:
-    form = affine_form(fit.model, fit.parameters)
-    if form is None:
-        return None
-    return dict(zip(("matrix", "bias_mps2"), form, strict=True))
-
-
-def json_number(value: Any) -> float | None:
-    """Convert a number for JSON: NaN becomes None."""
-    return None if value is None or not np.isfinite(value) else float(value)
-
-
 def json_content(content: Any) -> Any:
     """Content for JSON: records are objects, arrays are lists, what is no finite number is None."""
     if is_dataclass(content):
@@ -227,7 +198,7 @@ def json_content(content: Any) -> Any:
         return json_content(content.tolist())
     if isinstance(content, (list, tuple)):
         return [json_content(value) for value in content]
-    return json_number(content) if isinstance(content, float) else content
+    return None if isinstance(content, float) and not np.isfinite(content) else content
 
 
 def json_text(content: Any) -> str:

@@ -11,20 +11,8 @@ from accelstudy.basics.errors import InputError, UnknownNameError
 from accelstudy.basics.wording import comma_list
 from accelstudy.campaign.calibration.c_code import c_header
 from accelstudy.campaign.calibration.px4 import px4_losses, px4_parameters
-from accelstudy.campaign.calibration.sensor_calibration import SensorCalibration, affine_form
+from accelstudy.campaign.calibration.sensor_calibration import SensorCalibration
 from accelstudy.sensors.sensor import not_affine
-
-_WITHOUT_FORMULAS = (
-    "calibration.json has the parameters with their sigmas, `--form c` the formulas; "
-    "`accelstudy effects` lists those of all effects"
-)
-RETIRED = {
-    "json": _WITHOUT_FORMULAS,
-    "yaml": _WITHOUT_FORMULAS,
-    "ros": "`--form matrix` has the numbers of imu_calib, if the model is linear in the force: SM "
-    "is its first three columns, bias minus its last",
-}
-"""Forms of earlier versions, with what to do instead."""
 
 
 def matrix_text(calibration: SensorCalibration) -> str:
@@ -41,7 +29,7 @@ def matrix_text(calibration: SensorCalibration) -> str:
             f"no matrix can hold {comma_list(list(unfit))} of the model {model.name!r}; "
             "the form c holds all that a device can know"
         )
-    affine = affine_form(model, calibration.parameters)
+    affine = model.affine(calibration.parameters)
     if affine is None:
         raise InputError(f"the model {model.name!r} with these parameters has no inverse")
     (k, bias), raw = affine, calibration.conversion
@@ -67,8 +55,6 @@ def export(calibration: SensorCalibration, form: str) -> str:
     UnknownNameError, InputError
         If there is no such form, or it cannot hold the calibration.
     """
-    if form in RETIRED:
-        raise InputError(f"form {form}: no longer a form; {RETIRED[form]}")
     if form not in WRITERS:
         raise UnknownNameError("form", form, WRITERS)
     return WRITERS[form](calibration)

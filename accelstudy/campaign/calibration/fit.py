@@ -9,8 +9,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from accelstudy.adjustment import Adjustment, Observations, calibrate
-from accelstudy.adjustment.observations import AngleErrors, Known
-from accelstudy.adjustment.quality import GlobalTest, global_test, pooled_variance, solve
+from accelstudy.adjustment.observations import AngleErrors
+from accelstudy.adjustment.quality import (
+    GlobalTest,
+    Solution,
+    global_test,
+    pooled_variance,
+    solve,
+)
 from accelstudy.approaches import Approach, get_approach
 from accelstudy.basics.errors import InputError
 from accelstudy.basics.shares import sigmas_95
@@ -100,11 +106,15 @@ class CampaignFit:
         return float(self.adjustment.omega[0])
 
     @cached_property
+    def solution(self) -> Solution:
+        """The adjustment, linearised at the estimates."""
+        return solve(self.model, self.approach, self.observed, self.adjustment)
+
+    @property
     def sigma_dof(self) -> float:
         """Degrees of freedom of the stated noise in Ω; infinite where it is known."""
-        if not np.isfinite(self.observed.sigma_dof):
-            return self.observed.sigma_dof
-        return solve(self.model, self.approach, self.observed, self.adjustment).sigma_dof
+        stated = self.observed.sigma_dof
+        return self.solution.sigma_dof if np.isfinite(stated) else stated
 
     @cached_property
     def noise(self) -> JudgedNoise:
@@ -225,11 +235,6 @@ def campaign_noise(campaign: Campaign) -> Noise:
     )
 
 
-def _known_parameters(campaign: Campaign) -> Known:
-    """Prior knowledge of the parameters by the type of the sensor."""
-    return {} if campaign.sensor_type is None else campaign.sensor_type.known
-
-
 def least_sigma(campaign: Campaign, approach: Approach) -> float:
     """Smallest noise of a force, m/s², that can be weighed against that of the angles."""
     return LEAST_RATIO * campaign.gravity * (campaign.sigma_angle or 0.0) * approach.uses_angles
@@ -237,23 +242,21 @@ def least_sigma(campaign: Campaign, approach: Approach) -> float:
 
 def campaign_observations(campaign: Campaign) -> Observations:
     """Observations of a campaign for the adjustment, R = 1."""
-    noise = campaign_noise(campaign)
-    errors = angle_errors(campaign)
-    sigma_angle: float | Array = noise.sigma_angle
-    common = None
+    noise, errors = campaign_noise(campaign), angle_errors(campaign)
+    sigma_angle: tuple[float | Array, Array | None] = noise.sigma_angle, None
     if errors is not None and campaign.angles is not None:
-        sigma_angle, common = errors(campaign.angles)
+        sigma_angle = errors(campaign.angles)
     return Observations(
         forces=campaign.forces[None],
         sigma_force=noise.sigma_force,
         angles=None if campaign.angles is None else campaign.angles[None],
-        sigma_angle=sigma_angle,
-        common=common,
+        sigma_angle=sigma_angle[0],
+        common=sigma_angle[1],
         angle_errors=errors,
         gravity=campaign.gravity,
         sigma_gravity=campaign.sigma_gravity,
         hold=campaign.hold,
-        known=_known_parameters(campaign),
+        known={} if campaign.sensor_type is None else campaign.sensor_type.known,
         sigma_dof=campaign.sigma_dof or np.inf,
     )
 
@@ -272,7 +275,14 @@ def check_campaign(campaign: Campaign, model: SensorModel, approach: Approach) -
             f"{campaign.name}: approach {approach.name!r} needs the columns roll_robot_gon and "
             "pitch_robot_gon"
         )
-    check_columns(campaign, model)
+    for effect, column in model.needs:
+        if getattr(campaign.hold, column) is None:
+            attribute = "angles" if column in ("roll", "pitch") else column
+            names = " and ".join(COLUMNS[attribute].names)
+            raise InputError(
+                f"{campaign.name}: the effect {effect!r} of the model needs the {column} "
+                f"of each position; the campaign has no {names}"
+            )
     noise, least = campaign_noise(campaign), least_sigma(campaign, approach)
     if noise.sigma_force < least:
         raise InputError(
@@ -281,34 +291,10 @@ def check_campaign(campaign: Campaign, model: SensorModel, approach: Approach) -
         )
 
 
-def check_columns(campaign: Campaign, model: SensorModel) -> None:
-    """Raise `InputError` if a campaign lacks a column that an effect of the model needs."""
-    hold = campaign.hold
-    for effect in model.effects:
-        for column in compose(effect.spec, (effect.spec,)).hold_columns:
-            if getattr(hold, column) is None:
-                attribute = "angles" if column in ("roll", "pitch") else column
-                names = " and ".join(COLUMNS[attribute].names)
-                raise InputError(
-                    f"{campaign.name}: the effect {effect.name!r} of the model needs the {column} "
-                    f"of each position; the campaign has no {names}"
-                )
-
-
 def fit_campaign(
-    campaign: Campaign,
-    model: SensorModel,
-    approach: Approach | None = None,
-    diagnosing: bool = False,
+    campaign: Campaign, model: SensorModel, approach: Approach | None = None
 ) -> CampaignFit:
-    """Calibrate a campaign.
-
-    Parameters
-    ----------
-    campaign : Campaign
-    model : SensorModel
-    approach : Approach, optional; by default robot-aided if the campaign has the robot's angles
-    diagnosing : bool, whether gross errors were looked for, and mended, already
+    """Calibrate a campaign, by default robot-aided if it has the robot's angles.
 
     Raises
     ------
@@ -332,7 +318,7 @@ def fit_campaign(
         adjustment = calibrate(model, approach, observed)
     if not adjustment.converged[0]:
         _determined(campaign, model, approach, sigma_to_show_above(campaign))
-        raise InputError(f"{campaign.name}: {_cause(campaign, model, theory, diagnosing)}")
+        raise InputError(f"{campaign.name}: {_cause(campaign, model, theory)}")
     fit = CampaignFit(campaign, model, approach, observed, adjustment, theory)
     prior = model.prior_weights.any() or observed.common is not None or bool(observed.known)
     if campaign.sigma_force is None and prior and adjustment.redundancy > 0:
@@ -383,30 +369,25 @@ def campaign_estimability(
         campaign_noise(campaign),
         gravity=campaign.gravity,
         hold=campaign.hold,
-        known=_known_parameters(campaign),
+        known={} if campaign.sensor_type is None else campaign.sensor_type.known,
         forces=rough if blur else None,
         blur=blur,
     )
 
 
-def _cause(campaign: Campaign, model: SensorModel, theory: Estimability, diagnosing: bool) -> str:
+def _cause(campaign: Campaign, model: SensorModel, theory: Estimability) -> str:
     """Name the probable reason why an adjustment does not converge."""
-    gross = recognise(campaign)
-    more = "none is recognised here" if diagnosing else "`accelstudy diagnose` looks for more"
-    if gross is not None and not diagnosing:
-        what = f"{gross.reason}, and no calibration fits that; {more}"
-        return f"this looks like a gross error ({words(gross.name)}): {what}"
-    lost = f"the adjustment of the model {model.name!r} does not converge; "
-    if gross is not None:
-        what = f"beside what was mended this looks wrong ({words(gross.name)}): {gross.reason}"
-        return lost + what
+    more = "; `accelstudy diagnose` looks for more"
+    if (gross := recognise(campaign)) is not None:
+        what = f"{gross.reason}, and no calibration fits that"
+        return f"this looks like a gross error ({words(gross.name)}): {what}{more}"
+    why = f"a gross error in the data or a wrong unit is the usual cause{more}"
     if theory.condition > MAX_CONDITION:
-        return (
-            f"{lost}the {campaign.n_positions} positions hardly determine it (condition "
-            f"{theory.condition:.0f}, up to {MAX_CONDITION:.0f} is usual); "
-            "more attitudes are needed"
+        why = (
+            f"the {campaign.n_positions} positions hardly determine it (condition "
+            f"{theory.condition:.0f}, up to {MAX_CONDITION:.0f} is usual); add attitudes"
         )
-    return f"{lost}a gross error in the data or a wrong unit is the usual cause; {more}"
+    return f"the adjustment of the model {model.name!r} does not converge; {why}"
 
 
 def initial_values(model: SensorModel, forces: Array, gravity: float) -> Array:

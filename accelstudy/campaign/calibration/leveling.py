@@ -173,7 +173,7 @@ def _warnings(
     assumes_start: bool,
 ) -> tuple[str, ...]:
     """What the user should know of the calibration and of the rows."""
-    lost, needs = leveled.lost, calibration.needs
+    lost, needs = leveled.lost, calibration.model.needs
     timed = [effect for effect, column in needs if assumes_start and column == "time"]
     lagging = [effect for effect in timed if (effect, "temperature") in needs]
     moved = {effect for effect, column in needs if column.startswith("step_")}
@@ -203,7 +203,7 @@ def _warnings(
 
 def _read(calibration: SensorCalibration, log: LogFile, given: Mapping[str, Any]) -> SensorLog:
     """Open a log, and check that it has what the effects need."""
-    needed = {condition for _, condition in calibration.needs}
+    needed = {condition for _, condition in calibration.model.needs}
     ranged = {key for key in CONDITIONS if KNOWN[key] in calibration.ranges}
     read = read_log(
         log,
@@ -213,7 +213,7 @@ def _read(calibration: SensorCalibration, log: LogFile, given: Mapping[str, Any]
         untimed=True,
     )
     known = {*read.places, *(["time"] if read.layout.rate_hz is not None else [])}
-    for effect, condition in calibration.needs:
+    for effect, condition in calibration.model.needs:
         if condition in known or condition.startswith("step_"):
             continue
         where, how = f"{log}: the effect {effect} needs the {condition} of each row", OPTIONS
@@ -293,7 +293,7 @@ def _beyond_ranges(
 
 def _reason(calibration: SensorCalibration, log: SensorLog, row: int) -> str:
     """Say why a row is empty, and where it is."""
-    needed = {*AXES, "time", *(condition for _, condition in calibration.needs)}
+    needed = {*AXES, "time", *(condition for _, condition in calibration.model.needs)}
     lost = [key for key in log.lacking(row) if key in needed]
     if lost:
         return log.describe(row, lost[0])

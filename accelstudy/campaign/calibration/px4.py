@@ -10,8 +10,6 @@ lost is stated as errors of roll and pitch.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from dataclasses import replace
 from itertools import product
 
 import numpy as np
@@ -26,7 +24,6 @@ from accelstudy.leveling.angles import angles_of, wrap_angle
 from accelstudy.leveling.error import MAX_TILT_GON, cap_forces
 from accelstudy.pages import render_lines
 from accelstudy.positions.points import evenly_spread
-from accelstudy.sensors.models import compose
 
 Array = NDArray[np.float64]
 
@@ -82,12 +79,11 @@ def px4_losses(calibration: SensorCalibration) -> list[str]:
             f"PX4 takes readings in m/s^2, and this calibration is of readings in {unit}"
         )
     rms, largest = _loss(calibration)
-    parts = [effect for effect, alone in _alone(calibration) if _loss(alone)[1].max() > MIN_LOSS]
-    warmed = [each for each in calibration.model.effects if each.family == "temperature"]
-    lags = [(effect.name, tau) for effect in warmed if (tau := effect.settings.get("tau"))]
+    effects = calibration.model.effects
+    lags = [(effect.name, tau) for effect in effects if (tau := effect.settings.get("tau"))
+            and effect.family == "temperature"]  # fmt: skip
     is_lost = largest.max() > MIN_LOSS
-    sizes = rms / MGON, largest / MGON
-    return render_lines(TEMPLATE, "losses", is_lost, *sizes, parts, lags, MAX_TILT_GON)
+    return render_lines(TEMPLATE, "losses", is_lost, rms / MGON, largest / MGON, lags, MAX_TILT_GON)
 
 
 def _is_warmed(calibration: SensorCalibration) -> bool:
@@ -138,10 +134,3 @@ def _loss(calibration: SensorCalibration) -> tuple[Array, Array]:
     frame = calibration.usual_layout.axes
     error = wrap_angle(angles_of(frame.to_frd(corrected)) - angles_of(forces))
     return np.sqrt(np.mean(error**2, axis=0)), np.abs(error).max(axis=0)
-
-
-def _alone(calibration: SensorCalibration) -> Iterator[tuple[str, SensorCalibration]]:
-    """Yield each effect, with a calibration that has this effect alone."""
-    for effect, own in calibration.model.parts:
-        model, values = compose(effect.spec, (effect.spec,)), calibration.parameters[own]
-        yield effect.name, replace(calibration, model=model, parameters=values)

@@ -18,12 +18,11 @@ from accelstudy.basics.levels import REFUTATION_LEVEL
 from accelstudy.basics.progress import say, show, warn
 from accelstudy.basics.suggestions import HERE
 from accelstudy.basics.units import GON, InputQuantity
-from accelstudy.campaign.calibration import export, sensor_calibration, wording
-from accelstudy.campaign.calibration.assessment import Assessment, assess, tilt_left
+from accelstudy.campaign.calibration import export, wording
+from accelstudy.campaign.calibration.assessment import Assessment, tilt_left
 from accelstudy.campaign.calibration.document import (
     assessed_positions,
     calibration_document,
-    quality_document,
     write_json,
 )
 from accelstudy.campaign.calibration.figures import (
@@ -66,8 +65,7 @@ class Calibration(Result):
     ) -> None:
         self.fit, self.source = fit, Path("CAMPAIGN") if source is None else source
         if content is None:
-            quality = quality_document(self._assessment)
-            content = {**calibration_document(self._assessment.fit), "quality": quality}
+            content = calibration_document(self._assessment)
         self._content = content
         self.name = str(content["campaign"])
 
@@ -137,8 +135,7 @@ class Calibration(Result):
         check_type("level", level, float, expected="a probability between 0 and 1")
         if not 0 < level < 1:
             raise InputError(f"level: expected a probability between 0 and 1, not {level:g}")
-        dof = sensor_calibration.dof_of(self.content)
-        half = stats.t.ppf((1 + level) / 2, dof) * self.parameters["sigma"]
+        half = stats.t.ppf((1 + level) / 2, self.sensor.dof) * self.parameters["sigma"]
         value, unit = self.parameters["value"], self.parameters["unit"]
         return pd.DataFrame({"low": value - half, "high": value + half, "unit": unit})
 
@@ -149,7 +146,7 @@ class Calibration(Result):
 
     @cached_property
     def _assessment(self) -> Assessment:
-        return assess(self._fitted("residuals"))
+        return Assessment(self._fitted("residuals"))
 
     def tilt_error(self, tilt_range: float | str = MAX_TILT_GON * GON) -> pd.Series:
         """Return the rms tilt error that the calibration leaves, rad, of roll and of pitch.

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterable, Mapping
+from collections.abc import Collection, Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
 from os import PathLike
@@ -11,17 +11,16 @@ from typing import Annotated, Any, Literal, Self
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
-from pydantic import AfterValidator, BaseModel, Field, model_validator
+from pydantic import AfterValidator, BaseModel, ConfigDict, Field, model_validator
 
 from accelstudy.basics import bounds
-from accelstudy.basics.arguments import path_of
+from accelstudy.basics.arguments import check_type, path_of
 from accelstudy.basics.bounds import Range
-from accelstudy.basics.errors import InputError, brief
-from accelstudy.basics.units import STANDARD_GRAVITY
+from accelstudy.basics.errors import InputError
 from accelstudy.campaign.header import ANY, LogLayout, Nominal, PerAxis
-from accelstudy.effects import Effect, HoldConditions, TemperatureCourse
+from accelstudy.effects import HoldConditions, TemperatureCourse
 from accelstudy.effects.hold_conditions import REFERENCE_TEMPERATURE
-from accelstudy.files.reading import read_json, readable
+from accelstudy.files.reading import read_json
 from accelstudy.files.validation import (
     Gravity,
     Number,
@@ -33,7 +32,7 @@ from accelstudy.files.validation import (
 from accelstudy.leveling.angles import angles_of, tilt_by_output, tilt_slope
 from accelstudy.sensors.conversion import Conversion, conversion_of
 from accelstudy.sensors.models import compose
-from accelstudy.sensors.sensor import SensorModel, not_affine
+from accelstudy.sensors.sensor import SensorModel
 
 Array = NDArray[np.float64]
 
@@ -52,12 +51,6 @@ FORCES = {"fx_mps2": "forward", "fy_mps2": "right", "fz_mps2": "down"}
 """Ranges of the calibrated forces, and where they point."""
 KNOWN = {"temperature": "temperature_degC", "time": "time_s", "vibration": "vibration_mps2"}
 """Columns of `HoldConditions` that a device has, and the ranges of a calibration in them."""
-USUAL = {
-    "temperature": (REFERENCE_TEMPERATURE, REFERENCE_TEMPERATURE),
-    "time": (0.0, 0.0),
-    "vibration": (0.0, 0.0),
-}
-"""Ranges of a calibration that states none."""
 LEVELS = 5
 """Number of values of a condition that matters."""
 
@@ -72,7 +65,7 @@ class SensorCalibration:
     parameters : (u,) array, SI
     covariance : (u, u) array, SI
     gravity : float, m/s²
-    content : mapping, what is used of the file
+    content : mapping, that of the file, with defaults of what it lacks
     log : LogLayout, layout of the log from which the campaign was made; None if there was none
     ranges : mapping, of the calibration, see `calibration_document`
     """
@@ -88,7 +81,9 @@ class SensorCalibration:
     @property
     def dof(self) -> float:
         """Degrees of freedom of the noise in its sigmas; infinite where it is known."""
-        return dof_of(self.content)
+        if self.content["sigma_source"] == "a posteriori":
+            return float(self.content["redundancy"])
+        return float(self.content["sigma_dof"] or np.inf)
 
     @property
     def usual_layout(self) -> LogLayout:
@@ -112,11 +107,6 @@ class SensorCalibration:
         mended = self.content.get("mended") or {}
         return np.eye(3) if mended.get("matrix") is None else np.array(mended["matrix"], float)
 
-    @cached_property
-    def needs(self) -> tuple[tuple[str, str], ...]:
-        """Effects that need more than the force, each with a column of `HoldConditions`."""
-        return needs_of(self.model.effects) if self.model.hold_columns else ()
-
     @property
     def drifts(self) -> tuple[str, ...]:
         """Effects that drift during the session; afterwards they keep their value at its end."""
@@ -138,7 +128,7 @@ class SensorCalibration:
 
     def check_device(self) -> None:
         """Raise `InputError` if an effect needs a column that no device knows."""
-        for effect, column in unknown(self.needs):
+        for effect, column in unknown(self.model):
             what = "position before" if column.startswith("step_") else column
             raise InputError(
                 f"{effect} depends on the {what}, which no device knows; calibrate without it"
@@ -164,9 +154,9 @@ class SensorCalibration:
         """
         levels = []
         for column, name in KNOWN.items():
-            low, high = self.ranges.get(name, USUAL[column])
-            more = margin * (high - low)
-            least = -np.inf if column == "temperature" else 0.0
+            is_warm = column == "temperature"
+            low, high = self.ranges.get(name, 2 * [REFERENCE_TEMPERATURE if is_warm else 0.0])
+            more, least = margin * (high - low), -np.inf if is_warm else 0.0
             count = LEVELS if high > low and column in columns else 1
             levels.append(np.linspace(max(low - more, least), high + more, count))
         grid = np.stack(np.meshgrid(*levels, indexing="ij"), axis=-1).reshape(-1, len(levels))
@@ -245,7 +235,13 @@ class SensorCalibration:
         return forces + change[..., 0], share
 
 
-class _Parameter(BaseModel):
+class _Content(BaseModel):
+    """A part of `calibration.json`: what is used of it is checked, the rest is kept."""
+
+    model_config = ConfigDict(extra="allow")
+
+
+class _Parameter(_Content):
     name: str
     value: ParameterValue
     sigma: ParameterSigma | None
@@ -273,20 +269,20 @@ Ends = Annotated[
 ]
 
 
-class _CorrectionDocument(BaseModel):
+class _CorrectionDocument(_Content):
     error: str
     reason: str
     matrix: Regular | None
 
 
-class _Quality(BaseModel):
+class _Quality(_Content):
     state: str = ""
     plausible: bool = True
     warnings: list[str] = []
 
 
-class _Document(BaseModel):
-    """The part of `calibration.json` that is read; the rest is for people and other programs."""
+class _Document(_Content):
+    """What is used of `calibration.json`; the rest is for people and other programs."""
 
     schema_version: Annotated[Literal[1], Number]
     campaign: str
@@ -312,6 +308,7 @@ class _Document(BaseModel):
     mended: _CorrectionDocument | None = None
     quality: _Quality = _Quality()
     ranges: dict[str, Ends] = {}
+    warnings: list[str] = []
 
     @model_validator(mode="after")
     def _whole(self) -> Self:
@@ -342,49 +339,26 @@ def _check_covariance(covariance: Array) -> None:
         raise ValueError("covariance: no estimates have it; it is not positive semidefinite")
 
 
-def dof_of(content: Mapping[str, Any]) -> float:
-    """Degrees of freedom of the noise in the sigmas of a calibration; infinite if it is known."""
-    if content["sigma_source"] == "a posteriori":
-        return float(content["redundancy"])
-    return float(content.get("sigma_dof") or np.inf)
-
-
 def read_calibration(path: str | Path) -> SensorCalibration:
-    """Read `calibration.json`.
+    """Read a calibration.json, given by itself or by its folder.
 
     Raises
     ------
     InputError
         If there is no such file, or it is not a calibration.
     """
-    return calibration_of(read_calibration_content(path), f"{path}: {NO_CALIBRATION}")
-
-
-def read_calibration_content(path: str | Path) -> Any:
-    """Read all that `calibration.json` holds, without a check."""
-    with readable(path):
-        is_folder = Path(path).is_dir()
-    if is_folder:
-        raise InputError(f"{path}: a folder; give the calibration.json in it")
-    return read_json(path, NO_CALIBRATION)
-
-
-def file_of(given: Any, name: str) -> Path:
-    """Path of a calibration.json, given by itself or by its folder."""
-    path = path_of(name, given)
-    return path / "calibration.json" if path.is_dir() else path
+    path = Path(path)
+    path = path / "calibration.json" if path.is_dir() else path
+    return calibration_of(read_json(path, NO_CALIBRATION), f"{path}: {NO_CALIBRATION}")
 
 
 def sensor_of(given: Any, name: str = "calibration") -> SensorCalibration:
     """Return the part of a calibration that belongs to the sensor, by object or path."""
     if isinstance(given, str | PathLike):
-        return read_calibration(file_of(given, name))
+        return read_calibration(path_of(name, given))
     sensor = getattr(given, "sensor", None)
-    if not isinstance(sensor, SensorCalibration):
-        raise InputError(
-            f"{name}: expected what `calibrate` or `read_calibration` returns, or a path, not "
-            f"{brief(given)}"
-        )
+    expected = "what `calibrate` or `read_calibration` returns, or a path"
+    check_type(name, sensor, SensorCalibration, expected=expected)
     return sensor
 
 
@@ -397,12 +371,10 @@ def calibration_of(content: Any, where: str = NO_CALIBRATION) -> SensorCalibrati
         If it is no calibration.
     """
     document = validate(_Document, content, where)
-    whole = compose(document.model, tuple(document.effects))
     # Effects of the rig were estimated together with those of the sensor, but stay with the rig.
-    specs = [effect.spec for effect in whole.effects if effect.part == "sensor"]
-    stays = np.flatnonzero(whole.stays)
+    estimated = compose(document.model, tuple(document.effects))
+    model, stays = estimated.without_rig, np.flatnonzero(estimated.stays)
     covariance = np.array(document.covariance, dtype=float)  # None becomes NaN
-    model = compose(document.model, tuple(specs))
     parameters = np.array([entry.value for entry in document.parameters])[stays]
     if not model.hold_columns:
         probes = document.gravity_mps2 * np.concatenate([np.eye(3), -np.eye(3)])
@@ -419,40 +391,6 @@ def calibration_of(content: Any, where: str = NO_CALIBRATION) -> SensorCalibrati
     )
 
 
-def affine_form(model: SensorModel, parameters: ArrayLike) -> tuple[Array, Array] | None:
-    """K (3, 3) and b (3,) of f_b = K (f_s − b), or None if the model is not affine.
-
-    Effects of the rig are left out: they are no part of the sensor.
-
-    Parameters
-    ----------
-    model : SensorModel
-    parameters : (u,) array, SI
-    """
-    if not_affine(model):
-        return None
-    specs = [effect.spec for effect in model.effects if effect.part == "sensor"]
-    parameters = np.asarray(parameters, dtype=float)[..., model.stays]
-    model = compose(model.name, tuple(specs))
-    g = STANDARD_GRAVITY
-    probes = g * np.concatenate([np.zeros((1, 3)), np.eye(3), -np.eye(3)])
-    corrected = model.correct(probes, parameters)
-    if not np.isfinite(corrected).all():
-        return None
-    matrix = ((corrected[1:4] - corrected[4:7]) / (2 * g)).T
-    constant = corrected[0]
-    return matrix, -np.linalg.solve(matrix, constant)
-
-
-def needs_of(effects: Iterable[Effect]) -> tuple[tuple[str, str], ...]:
-    """Effects that need more than the force, each with a column of `HoldConditions`."""
-    return tuple(
-        (effect.name, column)
-        for effect in effects
-        for column in compose(effect.spec, (effect.spec,)).hold_columns
-    )
-
-
-def unknown(needs: Iterable[tuple[str, str]]) -> list[tuple[str, str]]:
-    """Effects that need a column that no device knows, of effects each with a column."""
-    return [(effect, column) for effect, column in needs if column not in KNOWN]
+def unknown(model: SensorModel) -> list[tuple[str, str]]:
+    """Effects that need a column that no device knows, each with it."""
+    return [(effect, column) for effect, column in model.needs if column not in KNOWN]

@@ -13,8 +13,10 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
+from accelstudy.basics.units import STANDARD_GRAVITY
 from accelstudy.campaign.session import Campaign
 from accelstudy.leveling.angles import specific_force
+from accelstudy.sensors.plausibility import LARGEST
 
 Array = NDArray[np.float64]
 
@@ -78,9 +80,29 @@ class RealSensor:
         return np.stack(columns, axis=1), (1 - np.sum(unit**2, axis=0, keepdims=True).T) / 2
 
     @cached_property
+    def _parameters(self) -> Array:
+        """Parameters (u, 3) or, of the norm alone, (u, 1) of the fitted sensor."""
+        return _robust(*self._design, np.inf if self.mounted else USUAL_SD)
+
+    @property
     def _explained(self) -> Array:
         """Part of that lack, of the same shape, that the fitted sensor explains."""
-        return _robust(*self._design, np.inf if self.mounted else USUAL_SD)
+        return np.asarray(self._design[0] @ self._parameters)
+
+    @cached_property
+    def strangeness(self) -> float:
+        """Largest bias or scale by the norm alone, over the largest that sensors have.
+
+        The readings lie on the ellipsoid uᵀMu + 2 qᵀu = 1 about −M⁻¹q.
+        """
+        xx, yy, zz, xy, yz, zx, *q = self.free._parameters[:9, 0]
+        shape = np.eye(3) + np.array([[2 * xx, xy, zx], [xy, 2 * yy, yz], [zx, yz, 2 * zz]])
+        if np.linalg.eigvalsh(shape)[0] <= 0:
+            return np.inf
+        bias = -np.linalg.solve(shape, q)
+        scales = np.sqrt((1 - bias @ q) * np.diag(np.linalg.inv(shape))) - 1
+        most = LARGEST["bias"] / STANDARD_GRAVITY, LARGEST["scale"]
+        return float(max(np.abs(bias).max() / most[0], np.abs(scales).max() / most[1]))
 
     @cached_property
     def expected(self) -> Array | None:
@@ -162,7 +184,7 @@ def _conditions(campaign: Campaign) -> list[Array]:
 
 
 def _robust(design: Array, lacking: Array, share: float) -> Array:
-    """Fit X p ≈ y robustly and return X p, (n, k); positions that are far off lose their weight.
+    """Fit X p ≈ y robustly and return p, (u, k); positions that are far off lose their weight.
 
     Each parameter is held near zero, as if it had been observed in each position with the standard
     deviation `share`, where the standard deviation of an observation is the usual distance. So the
@@ -182,4 +204,4 @@ def _robust(design: Array, lacking: Array, share: float) -> Array:
         weights = 1 / (1 + (distance / (MIN_RATIO * usual)) ** 2) ** 2
         normal = design.T * weights @ design / n + np.eye(u) * max((usual / share) ** 2, 1e-12)
         parameters = np.linalg.solve(normal, design.T * weights @ lacking / n)
-    return np.asarray(design @ parameters)
+    return np.asarray(parameters)

@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 
 from accelstudy.basics.errors import InputError
 from accelstudy.basics.units import ROBOT_UNITS, SENSOR_UNITS, STANDARD_GRAVITY, UNITS
-from accelstudy.basics.wording import comma_list
+from accelstudy.basics.wording import short_list
 from accelstudy.campaign.gross_errors.real_sensor import (
     MAX_USABLE_ERROR,
     MIN_POSITION_ERROR,
@@ -50,8 +50,6 @@ RIGHT_UNIT = 1 - LARGEST["scale"]
 MAX_AXIS_RATIO = 2.0
 """Axes are tried if their distance from the ideal sensor is at most this many times the smallest
 distance of any axes."""
-MAX_NAMED = 20
-"""Largest number of exchanged or wrong positions that a message names."""
 MAX_EXCHANGED = 1000
 """Largest number of rows that are reordered; if more do not fit, their order is not the cause."""
 MIN_POSITIONS_PER_OUTLIER = 8
@@ -157,8 +155,8 @@ def check_size(
     def near(size: float, gravity: float) -> bool:
         return gravity / 2 < size < gravity * 2
 
-    norm, share = usual_norm(forces), usual_norm(forces) / gravity - 1
-    what = f"the forces are about {norm:.3g} m/s²"
+    norm = usual_norm(forces)
+    what, share = f"the forces are about {norm:.3g} m/s²", norm / gravity - 1
     if near(norm, gravity):
         if abs(share) <= LARGEST["scale"]:
             return []
@@ -171,25 +169,22 @@ def check_size(
     number = norm / float(np.mean(np.abs(conversion.scale)))
     if unit != "m/s^2":
         what = f"the forces are about {number:.3g} {unit}, {norm:.3g} m/s²"
-    if near(norm, STANDARD_GRAVITY):
-        raise InputError(
-            f"{where}: {what}, which does not fit a gravity of {gravity:g} m/s²; give `gravity`"
-        )
     sizes = UNITS["m/s^2"]
     better = [u for u in SENSOR_UNITS if u != unit and near(number * sizes[u], gravity)]
-    if better:
-        raise InputError(
-            f"{where}: {what}: these look like {better[0]}, not {unit}; give `unit` {better[0]}"
-        )
-    if unit != "counts" and number > 100:
-        raise InputError(
-            f"{where}: {what}: these look like counts, not {unit}; give their nominal scale "
-            f"(`scale`), about {gravity / number:.3g} m/s² per count"
-        )
-    raise InputError(
-        f"{where}: {what}, nowhere near gravity, {gravity:g} m/s²; give another `unit`, `scale` or "
-        "`offset`, or other `columns`"
+    remedy = (
+        f", nowhere near gravity, {gravity:g} m/s²; give another `unit`, `scale` or `offset`, or "
+        "other `columns`"
     )
+    if near(norm, STANDARD_GRAVITY):
+        remedy = f", which does not fit a gravity of {gravity:g} m/s²; give `gravity`"
+    elif better:
+        remedy = f": these look like {better[0]}, not {unit}; give `unit` {better[0]}"
+    elif unit != "counts" and number > 100:
+        remedy = (
+            f": these look like counts, not {unit}; give their nominal scale (`scale`), about "
+            f"{gravity / number:.3g} m/s² per count"
+        )
+    raise InputError(f"{where}: {what}{remedy}")
 
 
 def check_plausible(campaign: Campaign, where: str, angle_unit: str = "gon") -> list[str]:
@@ -228,8 +223,8 @@ def check_plausible(campaign: Campaign, where: str, angle_unit: str = "gon") -> 
 def recognise(campaign: Campaign, attitude: bool = True) -> Recognition | None:
     """Recognise wrong units, swapped axes, exchanged rows and bumped positions, if they are gross.
 
-    Without the angles of a robot, swapped axes and exchanged rows do not show: they leave the norm
-    of the force as it is.
+    Without the angles of a robot, exchanged rows and swapped axes do not show, as they leave the
+    norm of the force as it is; but those of counts do, before their scales and offsets.
 
     Parameters
     ----------
@@ -266,12 +261,12 @@ def _everywhere(
     campaign: Campaign, attitude: bool, angle_unit: str = "gon"
 ) -> Generator[Correction, None, RealSensor]:
     """Undo a wrong unit and wrong axes, which all positions have; return the sensor after it."""
-    hypotheses = axes, partial(units, angle_unit=angle_unit)
+    other_units = partial(units, angle_unit=angle_unit)
     # The norm shows a wrong unit even if the axes are wrong, so gravity comes before the attitudes.
-    sensor = yield from _undo(RealSensor(campaign, False), *hypotheses)
+    sensor = yield from _undo(RealSensor(campaign, False), other_units)
     if attitude:
-        sensor = yield from _undo(replace(sensor, attitude=True), *hypotheses)
-    return sensor
+        return (yield from _undo(replace(sensor, attitude=True), axes, other_units))
+    return (yield from _undo(sensor, columns_of_counts))
 
 
 def _undo(
@@ -294,8 +289,8 @@ def _undo(
 
 def _is_clear(correction: Correction, before: RealSensor, after: RealSensor) -> bool:
     """Whether a correction clearly improves what was clearly wrong; no sensor is mirrored."""
-    if correction.left_out:
-        return True
+    if correction.left_out or (not before.attitude and correction.name == "axis_error"):
+        return True  # the hypothesis itself has compared
     if correction.changed is None:
         turned_over = correction.matrix is not None and np.linalg.det(correction.matrix) < 0
         if turned_over and before.free.is_mirrored:
@@ -312,9 +307,9 @@ def _is_clear(correction: Correction, before: RealSensor, after: RealSensor) -> 
 
 
 def axes(sensor: RealSensor) -> Iterator[Correction]:
-    """Undo each of the 47 exchanges of axes that are likely; none shows without a robot."""
+    """Undo each of the 47 exchanges of axes that are likely."""
     campaign = sensor.campaign
-    if sensor.expected is None or campaign.angles is None or not sensor.is_far_off:
+    if campaign.angles is None or not sensor.is_far_off:
         return
     ideal = attitude_forces(campaign)
     # An ideal sensor with any bias is near enough to compare all quickly.
@@ -334,6 +329,24 @@ def axes(sensor: RealSensor) -> Iterator[Correction]:
     yield from (one for _, one in sorted(near, key=lambda one: one[0]) if one.reason)
     exchanged = replace(campaign, angles=campaign.angles[:, ::-1].copy())
     yield Correction("axis_error", "roll and pitch of the robot are exchanged", exchanged)
+
+
+def columns_of_counts(sensor: RealSensor) -> Iterator[Correction]:
+    """Undo the exchange of columns of counts that gravity alone shows.
+
+    As they were read, no sensor has such biases and scales, though all positions may agree.
+    """
+    if sensor.campaign.nominal is None or not sensor.tells or sensor.strangeness <= 1:
+        return
+    exchanged = [shown for shown in SIGNED_PERMUTATIONS if min(shown) > 0]
+    tried = {
+        replace(sensor, campaign=correction.campaign): correction
+        for shown in exchanged
+        for correction in list(_undone(sensor.campaign, matrix_of(shown).T))[1:]
+    }
+    best = min(tried, key=lambda one: one.strangeness, default=sensor)
+    if best.strangeness <= 1:
+        yield tried[best]
 
 
 def _undone(campaign: Campaign, matrix: Array) -> Iterator[Correction]:
@@ -401,9 +414,7 @@ def rows(sensor: RealSensor) -> Iterator[Correction]:
     order[wrong] = wrong[_places(np.linalg.norm(cost, axis=2), least)]
     moved = order != np.arange(len(order))
     if moved.any():
-        shown = [str(position) for position in campaign.positions[moved][:MAX_NAMED]]
-        more = int(moved.sum()) - len(shown)
-        positions = ", ".join(shown) + (f" and {more} more" if more else "")
+        positions = short_list([*map(str, campaign.positions[moved])])
         reason = f"the forces of positions {positions} are exchanged"
         yield Correction("row_order", reason, reorder_rows(campaign, order), changed=moved)
 
@@ -439,17 +450,10 @@ def outliers(sensor: RealSensor) -> Iterator[Correction]:
     # Far from a usual sensor, and yet all may fit one whose bias or scale no sensor has.
     if sensor.free.distance.max() < MIN_POSITION_ERROR * sensor.gravity:
         return
-    names, sizes = [str(p) for p in bumped], sensor.distance[far]
-    if len(bumped) > MAX_NAMED:  # a raw log taken for a table of means has hundreds
-        first = ", ".join(names[:MAX_NAMED])
-        reason = (
-            f"{len(bumped)} positions ({first}, …) are wrong by up to {sizes.max():.2g} m/s^2, "
-            "like moves in a raw log"
-        )
-    else:
-        which, are = ("position", "is") if len(bumped) == 1 else ("positions", "are")
-        each = comma_list([f"{size:.2g}" for size in sizes])
-        reason = f"{which} {comma_list(names)} {are} wrong by {each} m/s^2"
+    positions, size = short_list([*map(str, bumped)]), sensor.distance[far].max()
+    reason = f"positions {positions} are wrong by up to {size:.2g} m/s^2"
+    if len(bumped) == 1:
+        reason = f"position {positions} is wrong by {size:.2g} m/s^2"
     left = campaign.without(dict.fromkeys(bumped, reason))
     yield Correction("outlier_position", reason, left, left_out=bumped)
 

@@ -104,7 +104,7 @@ def fit_base(campaign: Campaign, model: SensorModel, approach: Approach) -> Base
     stated, measured = campaign.sigma_force is not None, campaign
     # Without a sigma the weights of forces and angles need one: that of the residuals.
     for _ in range(1 if stated else 3):
-        fit = fit_campaign(measured, model, approach, diagnosing=True)
+        fit = fit_campaign(measured, model, approach)
         if fit.adjustment.redundancy <= 0:
             raise InputError(
                 f"{campaign.name}: {campaign.n_positions} positions leave no redundancy beside "

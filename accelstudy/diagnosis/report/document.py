@@ -14,11 +14,10 @@ from accelstudy.adjustment.quality import Solution
 from accelstudy.basics import plugins
 from accelstudy.basics.names import MAX_NAME_BYTES
 from accelstudy.basics.units import GON, MGON
-from accelstudy.campaign.calibration.assessment import assess
+from accelstudy.campaign.calibration.assessment import Assessment
 from accelstudy.campaign.calibration.document import (
     calibration_document,
     json_content,
-    quality_document,
 )
 from accelstudy.campaign.calibration.fit import CampaignFit, campaign_estimability
 from accelstudy.diagnosis.consequences import TiltErrors
@@ -191,13 +190,7 @@ def diagnosed_calibration(diagnosis: CampaignDiagnosis) -> dict[str, Any]:
         If the fit cannot be assessed.
     """
     fit = diagnosed_fit(diagnosis)
-    # The diagnosis has looked at these data, unless it changed them or left out their angles.
-    unchanged = diagnosis.recognised is None and bool(diagnosis.used_positions.all())
-    as_recognised = unchanged and (fit.approach.uses_angles or fit.campaign.angles is None)
-    content = {
-        **calibration_document(fit),
-        "quality": quality_document(assess(fit, without_gross_error=as_recognised)),
-    }
+    content = calibration_document(Assessment(fit))
     weights, recognised = np.asarray(fit.observed.sigma_force), diagnosis.recognised
     axes = (np.sqrt(fit.variance_factor) * weights[0]).tolist() if weights.ndim else []
     if axes:

@@ -17,7 +17,7 @@ from accelstudy.basics.errors import InputError
 from accelstudy.basics.progress import say, show, stage, warn
 from accelstudy.campaign.calibration.document import write_json
 from accelstudy.campaign.calibration.result import Calibration
-from accelstudy.campaign.calibration.sensor_calibration import needs_of, unknown
+from accelstudy.campaign.calibration.sensor_calibration import unknown
 from accelstudy.diagnosis.report import document, words
 from accelstudy.diagnosis.report.figures import diagnosis_figures, draw_explanations
 from accelstudy.diagnosis.result import MISSING, CampaignDiagnosis
@@ -171,8 +171,7 @@ def next_steps(
         return steps
     use = "Level a log with the calibration that is beside this page"
     steps.append((use, suggestions.apply(result)))
-    on_device = [effect for effect in d.extended_model.effects if effect.part == "sensor"]
-    if not unknown(needs_of(on_device)):
+    if not unknown(d.extended_model.without_rig):
         steps.append(("Take it to a device", suggestions.export("c", result)))
     if d.extended_model is not d.model:
         command = suggestions.calibrate("CAMPAIGN", place / "model.yaml", d.approach.name)
