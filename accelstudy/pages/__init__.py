@@ -16,9 +16,12 @@ from jinja2 import Environment, PackageLoader, StrictUndefined, Undefined
 from accelstudy.basics import units, wording
 from accelstudy.basics.progress import failure
 from accelstudy.files.outputs import whole_file
-from accelstudy.pages.glossary import explain_terms
+from accelstudy.files.reading import read_layer
 from accelstudy.sensors.frames import axes_note
 
+FOOT = "<!-- terms -->"
+"""Where a page explains its terms."""
+_NO_PROSE = re.compile(r"<(svg|style|script|select|title|pre|code|a)\b.*?</\1>|<[^>]*>", re.DOTALL)
 _CONTROLS = re.compile(r"[\x00-\x08\x0b\x0c\x0e-\x1f\x7f-\x9f]")  # no page may have them
 
 BADGES = {
@@ -65,6 +68,23 @@ def render(template: str, **content: Any) -> str:
     }
     page = explain_terms(_environment(True).get_template(template).render(of_angles | content))
     return _CONTROLS.sub(lambda control: control[0].encode("unicode_escape").decode("ascii"), page)
+
+
+@cache
+def terms() -> dict[str, str]:
+    """The terms that pages explain, with their meanings."""
+    return read_layer(Path(__file__).with_name("terms.yaml"))
+
+
+def explain_terms(page: str) -> str:
+    """Explain the terms of a page at its foot, where its mark is."""
+    prose = _NO_PROSE.sub(" ", page)
+    used = []
+    for term, meaning in terms().items():
+        form = re.sub(r"\\?[ -]", "[ -]", re.escape(term))  # some have hyphens, or a plural
+        if re.search(rf"(?<!\w){form}s?(?!\w)", prose, re.IGNORECASE):
+            used.append(f"<dt>{term}</dt><dd>{escape(meaning)}</dd>\n")
+    return page.replace(FOOT, f"<h2>Terms</h2>\n<dl>\n{''.join(used)}</dl>" if used else "")
 
 
 def write_page(path: Path, template: str, fallback: str, **content: Any) -> None:

@@ -3,8 +3,8 @@
 import click
 from markdown_text import page, table
 
+from accelstudy import pages
 from accelstudy.commands.main import SECTIONS, main
-from accelstudy.pages.glossary import TERMS
 
 WIDTH = 100
 """Of the help, letters."""
@@ -26,4 +26,4 @@ def _help(command, context):
 
 def terms():
     """The terms that reports explain."""
-    return table(("", ""), [(f"**{term}**", meaning) for term, meaning in TERMS.items()])
+    return table(("", ""), [(f"**{term}**", meaning) for term, meaning in pages.terms().items()])

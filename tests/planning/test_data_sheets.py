@@ -113,7 +113,7 @@ def test_a_nonlinearity_is_taken_as_a_parabola_or_a_cubic_of_the_same_deviation(
     ({"noise": "5 ug/sqrt(Hz)"}, "unknown key 'noise'"),
     ({"position_sigma": "2 mm/s2", "noise_density": "5 ug/sqrt(Hz)"}, "give one of them"),
     ({"position_sigma": "2 mm/s2", "nonlinearity": "1%"}, "full_scale: missing"),
-    ({"position_sigma": "2 mm/s2", "scale_per_kelvin": "1e200 ppm/K"}, "scale_per_kelvin: must be from"),
+    ({"position_sigma": "2 mm/s2", "scale_per_kelvin": "1e200 ppm/K"}, "must be from 0 to 1"),
 ])  # fmt: skip
 def test_what_is_no_data_sheet_ends_with_one_line(content, message):
     with refused("mine", message):
