@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Collection, Iterator, Sequence
 from dataclasses import replace
 from itertools import islice
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 import pyarrow as pa
@@ -103,8 +103,11 @@ def simulate(cell: Cell, seed: int) -> Replicates:
 def _joined(blocks: Sequence[Block]) -> Block:
     """Blocks of replicates that follow each other as one."""
     names = ("estimates", "sigma_priori", "omega", "iterations", "converged")
-    arrays = {name: np.concatenate([getattr(block, name) for block in blocks]) for name in names}
-    return replace(blocks[0], **arrays, correlation_sum=sum(b.correlation_sum for b in blocks))
+    arrays: dict[str, Any] = {
+        name: np.concatenate([getattr(block, name) for block in blocks]) for name in names
+    }
+    total = np.sum([block.correlation_sum for block in blocks], axis=0)
+    return replace(blocks[0], **arrays, correlation_sum=total)
 
 
 def _by_theory(theory: LinearTheory, cell: Cell, errors: Errors) -> tuple[Array, Array]:

@@ -1,112 +1,139 @@
-"""The charts of an explorer, as Vega-Lite; the page gives them their data and their width.
+"""The charts of an explorer as one specification of Vega-Lite, with its data.
 
 Rows of a chart are categories, so that names can be read on a narrow screen, too.
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+import json
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import altair as alt
+import pandas as pd
 
+from accelstudy.basics.units import display_unit
 from accelstudy.drawing.style import INK, approach_colour
+from accelstudy.study.figures.panels import ANGLES
 
-Layers = alt.LayerChart | alt.FacetChart
 PALE_OPACITY = 0.2
 """Opacity of set-ups that are not compared with the chosen one."""
 
 
-def all_charts(approaches: Sequence[str], fields: Sequence[str]) -> dict[str, Any]:
-    """All charts by their kinds; the page has several of a kind, and their titles.
+def explorer_charts(
+    setups: pd.DataFrame, parameters: pd.DataFrame, fields: Mapping[str, str]
+) -> dict[str, Any]:
+    """Tilt errors of set-ups, and standard deviations of the parameters of the chosen one.
+
+    The parameters of the specification are `by`, the field that the rows of the tilt errors show,
+    and `chosen`, the row of the chosen set-up. The page sets the width of the charts, and how many
+    stand side by side.
 
     Parameters
     ----------
-    approaches : those of the study
-    fields : columns of set-ups that may differ, without the approach
+    setups, parameters : DataFrame, as of `content`
+    fields : column of set-ups that may differ -> its title; without the approach
     """
-    charts = {
-        "roll": tilt_chart("roll", approaches, fields),
-        "pitch": tilt_chart("pitch", approaches, fields),
-        "sds": sds_chart(approaches),
-    }
-    look = alt.Config(
-        font="system-ui, sans-serif",
-        axis=alt.Axis(labelFontSize=12),
-        legend=alt.LegendConfig(orient="top", title=None, labelFontSize=12),
+    approaches, names = [*setups["approach"].unique()], [*fields] or ["model"]
+    usual = next((name for name in names if name not in ("model", "scheme", "n")), "scheme")
+    usual = usual if usual in names else names[0]
+    control = alt.binding_select(
+        options=names, labels=[*fields.values()], element="#by", name="Rows of the charts: "
     )
-    return {
-        name: {**chart.to_dict(), "width": "container", "config": look.to_dict()}
-        for name, chart in charts.items()
-    }
+    by, chosen = alt.param(name="by", value=usual, bind=control), alt.param(name="chosen", value={})
+    tilts = [tilt_chart(angle, approaches, names) for angle in ANGLES]
+    sds = [sds_chart(unit, approaches, names) for unit in parameters["unit"].unique()]
+    whole = alt.vconcat(
+        alt.concat(*tilts).resolve_scale(x="shared"),
+        alt.concat(*sds),
+        datasets={"setups": records(setups), "parameters": records(parameters)},
+    )
+    whole = whole.configure(font="system-ui, sans-serif").configure_axis(labelFontSize=12)
+    whole = whole.configure_legend(orient="top", title=None, labelFontSize=12)
+    return dict(whole.add_params(by, chosen).to_dict())
 
 
-def tilt_chart(angle: str, approaches: Sequence[str], fields: Sequence[str]) -> Layers:
-    """Tilt error in one angle, a point and a range for each set-up.
+def records(table: pd.DataFrame) -> list[dict[str, Any]]:
+    """Rows of a table, their numbers with four digits."""
+    numbers = table.select_dtypes("float").map(lambda value: float(f"{value:.4g}"))
+    return list(json.loads(table.assign(**numbers).to_json(orient="records", double_precision=15)))
 
-    Its parameters are `by`, the field that the rows show, from the control of this name, and
-    `chosen`, the chosen set-up. Pale are set-ups that differ from this also in another field.
+
+def _alike(fields: Sequence[str]) -> str:
+    """Whether a row is like the chosen set-up in fields, but in the one that the rows show.
+
+    A set-up without a robot has no noise of the robot, and is like those of any.
     """
-    by = alt.param(name="by", bind=alt.BindDirect(element="#by"))
-    chosen = alt.param(name="chosen", value={})
-    alike = " && ".join(
+    tests = (
         f"(by == '{field}' || datum['{field}'] == chosen['{field}'] || "
         f"!isValid(datum['{field}']) || !isValid(chosen['{field}']))"
         for field in fields
-        if field not in ("scheme", "n")
     )
-    same_scheme = "by == 'scheme' || by == 'n' || datum.scheme == chosen.scheme"
-    rows = _rows(approaches, "row", alt.EncodingSortField("order", op="min"))
+    return " && ".join(tests)
+
+
+def tilt_chart(angle: str, approaches: Sequence[str], fields: Sequence[str]) -> alt.LayerChart:
+    """Tilt error in one angle, a point and a range for each set-up.
+
+    Pale are set-ups that differ from the chosen one in a field that the rows do not show, too.
+    """
+    same_scheme = "(by == 'scheme' || by == 'n' || datum.scheme == chosen.scheme)"
+    others = [field for field in fields if field not in ("scheme", "n")]
+    rows = _rows("setups", approaches, "row", alt.EncodingSortField("order", op="min"))
     rows = rows.transform_calculate(
         row="isValid(datum[by]) ? datum[by] : 'without robot'",
         order="by == 'scheme' ? datum.n : isString(datum[by]) ? datum.i : datum[by] || -1",
-        alike=f"{alike} && ({same_scheme})",
+        alike=f"{_alike(others)} && {same_scheme}",
     )
     rows = rows.encode(
         opacity=_opacity("datum.alike", 1, PALE_OPACITY),
         tooltip=["model:N", "scheme:N", "approach:N", "state:N"]
         + [f"{angle}_{name}:Q" for name in ("rms", "low", "high", "q95")],
     )
-    # Both angles have the same axis; beyond its ends there is room for the crosses.
+    # Beyond the ends of the axis there is room for the crosses.
     x = alt.X(f"{angle}_rms:Q", title=None, axis=alt.Axis(format="~r", tickCount=6))
     x = x.scale(type="log", nice=False, padding=16)
     return alt.layer(
-        rows.mark_rule().encode(x="least:Q", x2="most:Q", opacity=alt.value(0)),
         rows.mark_rule(size=2).encode(x=f"{angle}_low:Q", x2=f"{angle}_high:Q"),
         rows.mark_tick(thickness=2, size=10).encode(x=f"{angle}_q95:Q"),
         rows.mark_point(size=230, strokeWidth=2).encode(
             x=x, color=alt.value(INK), opacity=_opacity("datum.i == chosen.i", 1, 0)
         ),
         _points(rows, approaches).encode(x=x),
-        rows.mark_text(text="×", fontSize=18).encode(
-            x=alt.value(alt.ExprRef("width - 8")),
+        rows.mark_text(text="×", fontSize=18, dx=-8).encode(
+            x=alt.value("width"),
             opacity=_opacity(
                 f"isValid(datum.{angle}_rms)", 0, alt.ExprRef(f"datum.alike ? 1 : {PALE_OPACITY}")
             ),
         ),
-    ).add_params(by, chosen)
+        title=f"{angle.capitalize()} / {display_unit('rad')}",
+    )
 
 
-def sds_chart(approaches: Sequence[str]) -> Layers:
-    """Standard deviations of the parameters of one unit: a posteriori, empirical, linear theory."""
-    numbers = ("sd_empirical", "sd_posteriori_mean", "sd_ratio", "coverage_95")
-    tooltip = ["parameter:N", "approach:N", "unit:N", *(f"{name}:Q" for name in numbers)]
-    rows = _rows(approaches, "parameter").encode(tooltip=tooltip)
+def sds_chart(unit: str, approaches: Sequence[str], fields: Sequence[str]) -> alt.LayerChart:
+    """Standard deviations of the parameters of one unit of the chosen set-up, by each approach."""
+    numbers = ("truth", "bias", "sd_empirical", "sd_posteriori_mean", "sd_linear")
+    tooltip = ["parameter:N", "approach:N", "unit:N"]
+    tooltip += [f"{name}:Q" for name in (*numbers, "sd_ratio", "coverage_95")]
+    rows = _rows("parameters", approaches, "parameter", None).encode(tooltip=tooltip)
+    its = _alike([field for field in fields if field != "n"]).replace("by == ", "'' == ")
+    rows = rows.transform_filter(f"datum.unit == '{unit}' && isValid(datum.sd_empirical) && {its}")
     x = alt.X("sd_posteriori_mean:Q", title=None, axis=alt.Axis(format="~r", tickCount=5))
     return alt.layer(
         rows.mark_bar(opacity=0.4).encode(x=x),
         rows.mark_rule(size=2).encode(x="sd_posteriori_mean_low:Q", x2="sd_posteriori_mean_high:Q"),
         rows.mark_tick(thickness=2, size=14).encode(x="sd_linear:Q", color=alt.value(INK)),
         _points(rows, approaches).encode(x="sd_empirical:Q"),
+        title=f"Standard deviations / {unit}",
     )
 
 
-def _rows(approaches: Sequence[str], field: str, sort: Any = None) -> alt.Chart:
+def _rows(data: str, approaches: Sequence[str], field: str, sort: Any) -> alt.Chart:
     """Rows of a chart, in each of which the approaches stand one below the other."""
     axis = alt.Axis(title=None, ticks=False, domain=False, grid=True, labelLimit=170)
     domain = list(approaches)
     colours = [approach_colour(name) for name in domain]
-    chart = alt.Chart(alt.NamedData("data"), height=alt.Step(30, **{"for": "position"}))
+    chart = alt.Chart(alt.NamedData(data), height=alt.Step(30, **{"for": "position"}))
     return chart.encode(
         y=alt.Y(f"{field}:N", sort=sort, axis=axis),
         yOffset=alt.YOffset("approach:N", scale=alt.Scale(domain=domain)),

@@ -1,13 +1,10 @@
 """What an explorer shows of a study, from its tables: set-ups, and their parameters.
 
-A set-up is a cell of the study. Each function returns a table with numbers in the units that people
-see; `records` and `compress` make them texts that the page reads again.
+A set-up is a cell of the study. Numbers are in the units that people see.
 """
 
 from __future__ import annotations
 
-import base64
-import gzip
 from collections import Counter
 from collections.abc import Callable
 from typing import Any
@@ -19,7 +16,7 @@ from accelstudy.approaches import get_approach
 from accelstudy.basics.units import display_unit
 from accelstudy.drawing.style import in_shown_unit, model_title
 from accelstudy.schemes import get_scheme
-from accelstudy.study.figures.factors import NOISES, Factor
+from accelstudy.study.figures.factors import NOISES
 from accelstudy.study.figures.panels import ANGLES, by_cell, group_sds, in_shown_units
 from accelstudy.study.figures.registry import Tables
 from accelstudy.study.statistics import TILTS
@@ -28,29 +25,7 @@ ENDS = {"low": 0.025, "q95": 0.95, "high": 0.975}
 """Probabilities at the ends of the central 95 %, and of what 95 % stay below."""
 IN_UNITS = ("truth", "bias", "sd_empirical", "sd_posteriori_mean", "sd_linear")
 SHARES = ("sd_ratio", "coverage_95")
-"""Columns of the summary in the unit of a parameter, and without one. The ends of an interval have
-the name of the number and `_low` and `_high`."""
-
-
-def records(table: pd.DataFrame) -> str:
-    """Write the rows of a table as JSON, their numbers with four digits."""
-    numbers = table.select_dtypes("float").map(lambda value: float(f"{value:.4g}"))
-    return table.assign(**numbers).to_json(orient="records", double_precision=15)
-
-
-def compress(text: str) -> str:
-    """Return a text gzipped, in base 64."""
-    return base64.b64encode(gzip.compress(text.encode(), mtime=0)).decode()
-
-
-def noise_levels(cells: pd.DataFrame) -> dict[Factor, pd.Series]:
-    """Levels of each noise as shown; NaN where there is none, as of a robot by gravity alone."""
-    uses_robot = np.array([get_approach(name).uses_angles for name in cells["approach"]])
-    cells = cells.assign(robot_sigma_mgon=cells["robot_sigma_mgon"].where(uses_robot))
-    return {
-        factor: pd.Series([float(f"{x:.6g}") for x in factor.shown(cells[factor.column])])
-        for factor in NOISES
-    }
+"""Columns of the summary in the unit of a parameter, and without one."""
 
 
 def setups(cells: pd.DataFrame, tables: Tables) -> tuple[pd.DataFrame, dict[str, str]]:
@@ -62,9 +37,13 @@ def setups(cells: pd.DataFrame, tables: Tables) -> tuple[pd.DataFrame, dict[str,
         "approach": ("approach", cells["approach"].astype(str)),
         "n": ("positions", cells["n_positions"]),
     }
-    for factor, levels in noise_levels(cells).items():
-        if levels.min() < levels.max():
-            columns[factor.name] = f"{factor.title} / {factor.shown_unit}", levels
+    uses_robot = np.array([get_approach(name).uses_angles for name in cells["approach"]])
+    noises = cells.assign(robot_sigma_mgon=cells["robot_sigma_mgon"].where(uses_robot))
+    for factor in NOISES:
+        if noises[factor.column].any():
+            levels = pd.Series(factor.shown(noises[factor.column]))
+            title = f"{factor.title} / {factor.shown_unit}"
+            columns[factor.name] = title, levels.map(lambda level: float(f"{level:.6g}"))
     for name in ("roll_rms", "roll_q95", "pitch_rms", "pitch_q95", "both_q95"):
         title = name.replace("_q95", " 95 % below").replace("_", " ")
         columns[name] = f"{title} / {unit}", tilt.pop(name)
@@ -82,8 +61,6 @@ def setups(cells: pd.DataFrame, tables: Tables) -> tuple[pd.DataFrame, dict[str,
     columns["state"] = "state", states
     table = pd.DataFrame({"i": range(len(cells)), "cell": cells["cell"].astype(str)})
     table = table.assign(**{name: each for name, (_, each) in columns.items()}, **tilt)
-    ends = table[[f"{angle}_{name}" for angle in ANGLES for name in ("low", "rms", "high")]]
-    table = table.assign(least=ends.min(axis=1), most=ends.max(axis=1))
     return table, {name: title for name, (title, _) in columns.items()}
 
 
@@ -114,14 +91,13 @@ def _ends(tables: Tables, quantity: str, by: list[str], columns: list[str]) -> p
     return rows.assign(end=end).pivot_table("value", by, columns)
 
 
-def parameters(cells: pd.DataFrame, tables: Tables) -> pd.DataFrame:
-    """Parameters of cells, a row each: `i`, the number of its cell, its unit, and its numbers."""
+def parameters(cells: pd.DataFrame, tables: Tables, setups: pd.DataFrame) -> pd.DataFrame:
+    """Parameters of set-ups, a row each: their numbers, unit, and the fields of the set-up."""
     ends = _ends(tables, "sd_posteriori", ["cell", "name"], ["end"])
     ends = ends.add_prefix("sd_posteriori_mean_")
-    of_cell = cells[["cell", "approach"]].assign(i=range(len(cells))).set_index("cell")
-    summary = tables["summary"].drop(columns="approach").join(of_cell, on="cell")
-    summary = summary.join(ends, on=["cell", "parameter"])
-    summary.columns = summary.columns.str.replace("_ci95_", "_")
-    stems = summary.columns.str.replace("_(low|high)$", "", regex=True)
-    table = in_shown_units(summary, *summary.columns[stems.isin(IN_UNITS)])
-    return table.loc[:, stems.isin(["i", "approach", "parameter", "unit", *SHARES, *IN_UNITS])]
+    summary = tables["summary"].join(ends, on=["cell", "parameter"])
+    numbers = [*IN_UNITS, "sd_posteriori_mean_low", "sd_posteriori_mean_high"]
+    table = in_shown_units(summary, *numbers)[["cell", "parameter", "unit", *numbers, *SHARES]]
+    fields = ["cell", "approach", "model", "scheme"]
+    fields += [factor.name for factor in NOISES if factor.name in setups]
+    return table.merge(setups[fields], on="cell").drop(columns="cell")
