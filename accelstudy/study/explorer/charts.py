@@ -16,6 +16,7 @@ from accelstudy.basics.units import display_unit
 from accelstudy.drawing.style import INK, approach_colour
 from accelstudy.study.figures.panels import ANGLES
 
+Layers = alt.LayerChart | alt.FacetChart
 PALE_OPACITY = 0.2
 """Opacity of set-ups that are not compared with the chosen one."""
 
@@ -72,7 +73,7 @@ def _alike(fields: Sequence[str]) -> str:
     return " && ".join(tests)
 
 
-def tilt_chart(angle: str, approaches: Sequence[str], fields: Sequence[str]) -> alt.LayerChart:
+def tilt_chart(angle: str, approaches: Sequence[str], fields: Sequence[str]) -> Layers:
     """Tilt error in one angle, a point and a range for each set-up.
 
     Pale are set-ups that differ from the chosen one in a field that the rows do not show, too.
@@ -110,7 +111,7 @@ def tilt_chart(angle: str, approaches: Sequence[str], fields: Sequence[str]) -> 
     )
 
 
-def sds_chart(unit: str, approaches: Sequence[str], fields: Sequence[str]) -> alt.LayerChart:
+def sds_chart(unit: str, approaches: Sequence[str], fields: Sequence[str]) -> Layers:
     """Standard deviations of the parameters of one unit of the chosen set-up, by each approach."""
     numbers = ("truth", "bias", "sd_empirical", "sd_posteriori_mean", "sd_linear")
     tooltip = ["parameter:N", "approach:N", "unit:N"]

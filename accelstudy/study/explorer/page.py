@@ -36,6 +36,11 @@ OPTIONS = {
     },
 }
 """Of the table of set-ups, for DataTables."""
+PANES = {
+    **{"cascadePanes": True, "orderable": False, "initCollapsed": True},
+    "layout": "columns-4",
+}
+"""Of the panes by which it is filtered."""
 
 
 def write_explorer(study: Study, tables: Mapping[str, pd.DataFrame], output: str | Path) -> None:
@@ -58,10 +63,8 @@ def explorer_page(study: Study, tables: Mapping[str, pd.DataFrame]) -> str:
     cells = tables["cells"]
     rows, titles = setups(cells, tables)
     names = ["model", "scheme", "n", *(factor.name for factor in NOISES)]
-    fields = {name: titles[name] for name in names if name in titles and rows[name].nunique() > 1}
+    fields = {name: titles[name] for name in names if name in titles and len({*rows[name]}) > 1}
     shown = [i for i, name in enumerate(titles) if name in fields or name == "approach"]
-    panes = {"cascadePanes": True, "orderable": False, "initCollapsed": True}
-    panes |= {"layout": "columns-4", "columns": shown}
     columns = [{"data": name, "title": title} for name, title in titles.items()]
     bundle = files("itables") / "html"
     calibrations = f"{int(cells['n_replicates'].sum()):,}".replace(",", "\u202f")
@@ -71,7 +74,7 @@ def explorer_page(study: Study, tables: Mapping[str, pd.DataFrame]) -> str:
         counts=f"{plural(len(cells), 'set-up')} with {calibrations} simulated calibrations.",
         tables=comma_list([f"{name}.parquet" for name in TABLES]),
         charts=explorer_charts(rows, parameters(cells, tables, rows), fields),
-        options={**OPTIONS, "columns": columns, "searchPanes": panes},
+        options={**OPTIONS, "columns": columns, "searchPanes": {**PANES, "columns": shown}},
         start=_start(study, cells),
         datatables=base64.b64encode((bundle / "dt_bundle.js").read_bytes()).decode(),
         style=(bundle / "dt_bundle.css").read_text("utf-8"),
