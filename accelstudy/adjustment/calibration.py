@@ -88,8 +88,7 @@ class CalibrationProblem:
 
     `observed` holds the forces (R, n, 3) and, if the approach uses them, the angles (R, n, 2).
     `direct` holds what is known of the parameters directly, (R, u), and `weights` (u,) its weights:
-    gravity, what effects know of their parameters a priori, and errors that all angles share. To
-    be adjusted, `weights` may be a matrix (u, u).
+    gravity, what effects know of their parameters a priori, and errors that all angles share.
     """
 
     model: SensorModel

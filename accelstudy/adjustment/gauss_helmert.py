@@ -138,9 +138,8 @@ def adjust(
     initial : (u,) or (R, u) array, initial values of the parameters
     parameter_observations : (R, u) array, optional
         Direct observations of parameters, such as gravity with σ_g.
-    parameter_weights : (u,) or (u, u) array, optional
-        Their weights, or their weight matrix; a weight of zero means that the parameter is not
-        observed.
+    parameter_weights : (u,) array, optional
+        Their weights; a weight of zero means that the parameter is not observed.
     latent : (k, R, n) array, optional
         Initial value of the quantity that the equations carry along.
     max_iterations : int
@@ -163,8 +162,7 @@ def adjust(
     x = np.empty((n_unknowns, n_replicates))
     x[:] = np.moveaxis(np.atleast_2d(np.asarray(initial, dtype=float)), -1, 0)
     v = np.zeros_like(observed)
-    weights = np.zeros(n_unknowns) if parameter_weights is None else np.asarray(parameter_weights)
-    weights = np.diag(weights) if weights.ndim == 1 else weights
+    weights = np.diag(np.zeros(n_unknowns) if parameter_weights is None else parameter_weights)
     direct = np.zeros_like(x)
     if parameter_observations is not None:
         direct[:] = np.moveaxis(np.atleast_2d(np.asarray(parameter_observations)), -1, 0)

@@ -38,14 +38,6 @@ def diagnose(
     return _of_campaign("diagnose", campaign, model, approach, prior, "diagnosis")
 
 
-def study_again(configuration: Path) -> str:
-    """Run a study anywhere, which takes a workflow; `init` brings it."""
-    study = new_name(configuration.parent, "study")
-    run = ["snakemake", "--cores", 2, "--snakefile", study / "Snakefile"]
-    run += ["--configfile", configuration]
-    return f"{_line('init', study)} && {shlex.join(map(str, run))}"
-
-
 def new_name(folder: str | Path, what: str) -> Path:
     """Name in the current folder for what comes of a folder.
 

@@ -160,7 +160,7 @@ SECTIONS = {
             out="YAML file for the positions.",
             sections={
                 "The calibration": "model approach positions sigma robot_sigma gravity_sigma",
-                "What the positions are to be good for": "criterion tilt_range neglect after",
+                "What the positions are to be good for": "criterion tilt_range after",
                 "What the positions must keep to": "attitudes roll pitch pole_distance",
             },
         ),

@@ -1,6 +1,6 @@
 """The least value of a criterion, from designs with shares instead of whole positions.
 
-A convex criterion is also a convex function of the shares w, so that its derivatives at any w bound
+A criterion is also a convex function of the shares w, so that its derivatives at any w bound
 it (`criteria`). The better the shares, the closer the bound.
 """
 
@@ -37,7 +37,7 @@ class Continuous:
     ----------
     directions : (k, 3) array, attitudes with a share
     shares : (k,) array, of sum 1
-    value : float, of the criterion without neglected effects for n positions with these shares
+    value : float, of the criterion for n positions with these shares
     bound : float, lower bound of the criterion for any n positions
     """
 
@@ -62,27 +62,26 @@ class _Slope:
 
 def continuous_optimum(task: Task, criterion: Criterion, allowed: Attitudes, n: int) -> Continuous:
     """Find the best shares for n positions among the attitudes that are allowed."""
-    convex = criterion.convex
     fine, points = allowed.sample(BOUND_ATTITUDES), allowed.sample(SHARED_ATTITUDES)
     fine_flat, flat = _flat(task, fine), _flat(task, points)
     shares, u = np.full(len(points), 1 / len(points)), len(task.names)
     value, bound = np.inf, -np.inf
     for _ in range(ROUNDS):
-        shares = _share(task.prior, convex, flat, shares, n)
+        shares = _share(task.prior, criterion, flat, shares, n)
         keep = shares > 1e-7 / len(shares)
         points, flat, shares = points[keep], flat[keep], shares[keep] / shares[keep].sum()
         best, normal = (points, shares), task.prior + n * (shares @ flat).reshape(u, u)
-        value, slope = float(convex.value(normal)), convex.gradient(normal)
+        value, slope = float(criterion.value(normal)), criterion.gradient(normal)
         lowest = fine[np.argsort(fine_flat @ slope.ravel(), kind="stable")[:LOWEST]]
         lowest = settle(task, _Slope(slope), allowed, lowest)
         flat_lowest = _flat(task, lowest)
         least = min(float((each @ slope.ravel()).min()) for each in (flat, flat_lowest))
-        bound = max(bound, convex.bound(task.prior, normal, n, least))
+        bound = max(bound, criterion.bound(task.prior, normal, n, least))
         if value - bound < MAX_GAP:
             break
         points, flat = np.concatenate([points, lowest]), np.concatenate([flat, flat_lowest])
         shares = np.concatenate([0.9 * shares, np.full(len(lowest), 0.1 / len(lowest))])
-    return Continuous(*best, value, criterion.with_neglected(bound))
+    return Continuous(*best, value, bound)
 
 
 def _flat(task: Task, directions: Array) -> Array:

@@ -73,8 +73,8 @@ def _drift_shown(task: Task, directions: Array) -> Array:
 
     directions : (k, n, 3) array, of k orders. Returns (k,).
     """
-    (k, n), u = directions.shape[:2], np.count_nonzero(task.estimated)
-    rows = task.rows(directions.reshape(-1, 3))[..., task.estimated].reshape(k, n, -1, u)
+    (k, n), u = directions.shape[:2], len(task.names)
+    rows = task.rows(directions.reshape(-1, 3)).reshape(k, n, -1, u)
     effects = [effect.name for effect in task.model.effects for _ in effect.parameters]
     biases = np.flatnonzero(np.array(effects) == "bias")
     drifts = np.linspace(-1.0, 1.0, n)[:, None, None] * rows[..., biases]

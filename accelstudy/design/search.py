@@ -180,16 +180,16 @@ class Search:
 
     def least_value(self, directions: Array) -> float:
         """Lower bound of the criterion of as many positions, by the derivatives at these."""
-        normal, criterion = self.task.normal(directions), self.criterion.convex
-        gains = np.tensordot(self._informations, criterion.gradient(normal), 2)
-        return criterion.bound(self.task.prior, normal, len(directions), float(gains.min()))
+        normal = self.task.normal(directions)
+        least = float(np.tensordot(self._informations, self.criterion.gradient(normal), 2).min())
+        return self.criterion.bound(self.task.prior, normal, len(directions), least)
 
     def _check(self, n: int) -> None:
         """Raise `InputError` if no attitude is allowed, or n positions have too few conditions."""
         if not len(self.candidates):
             limits = ", ".join(self.allowed.constraints) or "no constraints"
             raise InputError(f"no attitude is left of {self.allowed.text} with {limits}")
-        unknown = int(np.count_nonzero(self.task.estimated))
+        unknown = len(self.task.names)
         rank_before = int(np.linalg.matrix_rank(self.task.prior))
         least = -(-(unknown - rank_before) // self.task.approach.n_conditions)
         if n < least:

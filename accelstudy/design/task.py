@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
 
@@ -17,7 +16,6 @@ from accelstudy.design.information import Information, position_rows
 from accelstudy.leveling.error import ATTITUDES, MAX_TILT_GON, cap_forces, tilt_error
 from accelstudy.positions.points import evenly_spread
 from accelstudy.positions.scheme import Scheme
-from accelstudy.sensors.models import compose, get_model
 from accelstudy.sensors.sensor import SensorModel
 from accelstudy.simulation.hold_plan import HoldPlan, check_needs_no_plan
 from accelstudy.simulation.sessions import Noise
@@ -44,8 +42,6 @@ class Task:
     noise : Noise
     tilt_range : float, rad, up to which the calibrated sensor is used
     measured : (k, 3) array of unit vectors, directions of positions measured before
-    neglected : mapping of effect to the sd of its parameters, SI; effects that the sensor has and
-        the model lacks, for criteria that take them into account
 
     Raises
     ------
@@ -58,34 +54,20 @@ class Task:
     noise: Noise = field(default_factory=Noise)
     tilt_range: float = MAX_TILT_GON * GON
     measured: Array = field(default_factory=lambda: np.zeros((0, 3)))
-    neglected: Mapping[str, float] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
-        check_needs_no_plan(self.extended)
-        if back := [c for c in self.extended.hold_columns if c in LOOKING_BACK]:
+        check_needs_no_plan(self.model)
+        if back := [c for c in self.model.hold_columns if c in LOOKING_BACK]:
             raise InputError(
-                f"the model {self.extended.name!r} depends on the order of the positions "
+                f"the model {self.model.name!r} depends on the order of the positions "
                 f"({back[0]}), which a set of attitudes does not have; leave that effect out"
             )
-
-    @cached_property
-    def extended(self) -> SensorModel:
-        """The model with the neglected effects, traced once."""
-        if not self.neglected:
-            return self.model
-        every = get_model("+".join((*(e.spec for e in self.model.effects), *self.neglected)))
-        return compose(every.name, tuple(effect.spec for effect in every.effects))
 
     @property
     def names(self) -> tuple[str, ...]:
         """Names of all parameters, gravity last if it is observed."""
         observed = ("g",) if self.noise.sigma_gravity > 0 else ()
-        return (*self.extended.parameter_names, *observed)
-
-    @cached_property
-    def estimated(self) -> NDArray[np.bool_]:
-        """Which of all parameters are estimated, (u,)."""
-        return np.array([name in (*self.model.parameter_names, "g") for name in self.names])
+        return (*self.model.parameter_names, *observed)
 
     @cached_property
     def scale(self) -> Array:
@@ -96,8 +78,8 @@ class Task:
     def rows(self, directions: ArrayLike) -> Array:
         """Rows of the design matrix of k positions at unit weight, (k, c, u), SI."""
         directions = np.asarray(directions, dtype=float)
-        hold = HoldPlan().hold(len(directions)) if self.extended.hold_columns else None
-        return position_rows(self.extended, self.approach, self.noise, directions, hold=hold)
+        hold = HoldPlan().hold(len(directions)) if self.model.hold_columns else None
+        return position_rows(self.model, self.approach, self.noise, directions, hold=hold)
 
     def informations(self, directions: ArrayLike) -> Array:
         """Scaled information of each of k positions, (k, u, u)."""
@@ -126,20 +108,12 @@ class Task:
     @cached_property
     def tilt_weights(self) -> Array:
         """Quadratic forms of scaled errors: mean squares of roll and of pitch, (2, u, u), rad²."""
-        u, model = len(self.names), self.extended
+        u, model = len(self.names), self.model
         ideal, f_b = np.zeros(model.n_parameters), cap_forces(self.tilt_range, ATTITUDES)
         error = tilt_error(model, ideal, model, ideal, f_b, hold=HoldPlan().use(f_b, 1))
         weights = np.zeros((2, u, u))
         weights[:, : len(ideal), : len(ideal)] = error.quadratic
         return weights / np.outer(self.scale, self.scale)
-
-    @cached_property
-    def neglected_sigmas(self) -> Array:
-        """Scaled standard deviations of the parameters that are neglected, (u − estimated,)."""
-        sizes = np.zeros(len(self.names))
-        owners = [effect.spec for effect in self.extended.effects for _ in effect.parameters]
-        sizes[: len(owners)] = [self.neglected.get(spec, 0.0) for spec in owners]
-        return np.asarray((sizes * self.scale)[~self.estimated])
 
     def missing(self, directions: Array) -> str:
         """Why readings in positions do not determine the model; empty if they do."""

@@ -68,6 +68,7 @@ COMPARISON = OutputKind(
 # history.parquet is of folders of 0.3.
 HISTORY = OutputKind("history", "history.json", ("history.parquet", "report.html"), ("figures",))
 LOT = OutputKind("lot", "lot.json", ("type.yaml", "report.html"), ("figures", "each"))
+# study.yaml is of folders of 0.3.
 _PLAN_FILES = ("positions.yaml", "study.yaml", "plan.svg", "plan.png")
 PLAN = OutputKind("plan", "plan.parquet", _PLAN_FILES)
 _TABLES = ("cells", "summary", "correlations", "leveling", "quantiles")

@@ -14,7 +14,7 @@ from accelstudy.planning.candidates import Candidate, candidates, sort_by_time
 from accelstudy.planning.fewest import CalibrationKind, cheapest
 from accelstudy.planning.plan import Plan, most_accurate
 from accelstudy.planning.question import Equipment, Question
-from accelstudy.planning.simulated import simulate_candidates, study_of
+from accelstudy.planning.simulated import simulate_candidate
 
 MAX_RANKED = 5
 """Candidates that are simulated and ranked, and more only for other equipment."""
@@ -108,8 +108,7 @@ def _confirm(plan: Plan, candidate: Candidate, first: bool) -> Candidate | None:
     for _ in range(MAX_TRIES):
         if tried is None:
             break
-        config = study_of(question, [tried], plan.seed, plan.replicates)
-        (simulated,) = simulate_candidates(question, config)
+        simulated = simulate_candidate(question, tried, plan.seed, plan.replicates)
         if question.accuracy(simulated) <= question.target:
             reached = replace(tried, simulated=simulated)
         else:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import replace
 from functools import cached_property
@@ -29,7 +29,6 @@ from accelstudy.basics.units import (
     angles_in,
     attitude_unit,
     display_unit,
-    parse_quantity,
     to_attitude,
     to_display,
     to_recorded,
@@ -40,12 +39,10 @@ from accelstudy.design.search import Search, round_directions
 from accelstudy.design.spaces import SPACES, angles_to, find_attitudes
 from accelstudy.design.task import Task
 from accelstudy.drawing.style import FULL
-from accelstudy.effects import get_effect
 from accelstudy.files.outputs import new_file
 from accelstudy.pages.result import Result
 from accelstudy.schemes import get_scheme, is_scheme_file
 from accelstudy.sensors.models import get_model
-from accelstudy.sensors.sensor import SensorModel
 from accelstudy.simulation.sessions import Noise
 
 if TYPE_CHECKING:
@@ -64,7 +61,7 @@ class Design(Result):
     search : accelstudy.design.search.Search
     directions : (n, 3) array of unit vectors, in the order of measurement, as in the file
     efficiency : float, least share of the best that as many positions can reach; NaN if unknown
-    asked : mapping, texts and numbers that were given: attitudes, after, neglect, starts
+    asked : mapping, texts and numbers that were given: attitudes, after, starts
     """
 
     size = FULL, 80.0
@@ -82,8 +79,7 @@ class Design(Result):
             search = search_for(**given)
             found = search.optimum(positions, starts)
             order = field_order(search.task, found.directions)
-        names = ("attitudes", "after", "neglect")
-        asked = {name: given[name] for name in names} | {"starts": starts}
+        asked = {"attitudes": given["attitudes"], "after": given["after"], "starts": starts}
         return cls(search, found.directions[order], found.efficiency, asked)
 
     @property
@@ -127,7 +123,6 @@ class Design(Result):
             "attitudes": search.allowed.text,
             "constraints": constraints,
             "after": get_scheme(asked["after"]).name if asked["after"] else None,
-            "neglected": list(asked["neglect"]),
             "seed": search.seed,
             "starts": asked["starts"],
             "efficiency": tidy(self.efficiency, 6),
@@ -182,12 +177,11 @@ class Design(Result):
             robot = to_display(task.noise.sigma_angle, "rad")
             noise += f" and robot noise {robot:.3g} {display_unit('rad')}"
         tilt = f"{to_attitude(task.tilt_range):.4g} {attitude_unit()}"
-        effects = ", the neglected effects included" if task.neglected else ""
         after = f" after {self.asked['after']}" if self.asked["after"] else ""
         rms = rms_tilt(task, reference.directions)
         theirs = _both(rms) if np.isfinite(rms).all() else "do not determine the model"
         yield "\nturn: angle from the position before; 0 repeats it."
-        yield f"Expected rms of leveling for tilts up to {tilt}, with {noise}{effects}:"
+        yield f"Expected rms of leveling for tilts up to {tilt}, with {noise}:"
         yield f"  these {self.name}{after}: {_both(self.rms)}"
         yield f"  the {reference.n_positions} of {REFERENCE}{after}: {theirs}"
         if self.efficiency == self.efficiency:
@@ -234,7 +228,6 @@ def search_for(
     gravity_sigma: float,
     tilt_range: float,
     after: str | None,
-    neglect: Sequence[str],
     attitudes: str,
     seed: int,
     **constraints: Any,
@@ -243,39 +236,15 @@ def search_for(
     bounds.SIGMA_FORCE.check_key(key("sigma"), sigma)
     bounds.SIGMA_ANGLE.check_key(key("robot_sigma"), robot_sigma / MGON)
     bounds.SIGMA_GRAVITY.check_key(key("gravity_sigma"), gravity_sigma)
-    known = get_model(model)
     task = Task(
-        known,
+        get_model(model),
         get_approach(approach),
         Noise(sigma, robot_sigma, gravity_sigma),
         tilt_range,
         measured=get_scheme(after).directions if after else np.zeros((0, 3)),
-        neglected=_neglected(known, neglect),
     )
     allowed = replace(find_attitudes(attitudes, SPACES), **constraints)
     return Search(task, get_criterion(criterion, task), allowed, seed)
-
-
-def _neglected(model: SensorModel, texts: Sequence[str]) -> dict[str, float]:
-    """Sd, SI, of the parameters of each neglected effect; without one that of cheap equipment."""
-    sizes: dict[str, float] = {}
-    for text in texts:
-        # An effect may have settings of its own, with equal signs.
-        name, equal, size = text.rpartition("=")
-        if not equal or ")" in size:
-            name, size = text, ""
-        effect = get_effect(name.strip())
-        if effect.spec in [one.spec for one in model.effects]:
-            raise InputError(f"the effect {effect.spec!r} is in the model; it is not neglected")
-        sizes[effect.spec] = effect.typical[1]
-        if size:
-            try:
-                sizes[effect.spec] = parse_quantity(size, effect.parameters[0].unit)
-            except InputError as error:
-                raise InputError(f"neglect: {text}: {error}") from None
-        if not sizes[effect.spec] > 0:
-            raise InputError(f"neglect: {text}: must be more than 0")
-    return sizes
 
 
 @contextmanager

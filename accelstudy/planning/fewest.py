@@ -15,7 +15,6 @@ from accelstudy.basics.units import GON, MGON
 from accelstudy.design.criteria import MINIMAX, get_criterion
 from accelstudy.design.search import Search
 from accelstudy.design.task import Task
-from accelstudy.leveling.distribution import NOISE
 from accelstudy.planning.candidates import (
     LEAST_REDUNDANCY,
     Candidate,
@@ -24,7 +23,7 @@ from accelstudy.planning.candidates import (
     sort_by_time,
 )
 from accelstudy.planning.question import Equipment, Question
-from accelstudy.schemes.files import remember
+from accelstudy.schemes.files import parse_scheme
 from accelstudy.sensors.models import get_model
 from accelstudy.sensors.sensor import SensorModel
 from accelstudy.simulation.sessions import Noise
@@ -66,21 +65,17 @@ class CalibrationKind:
         left = self.question.most_seconds - self.equipment.setup
         return most if left >= most * each else math.floor(left / each + 1e-9)
 
-    def search(self, n: int, with_neglected: bool = False) -> Search:
+    def search(self, n: int) -> Search:
         """Search for the best n positions, as `accelstudy design` makes it."""
         noise, question = Noise(), self.question
         if self.equipment.name != "gravity":  # with a single noise the best positions are the same
             angle = tidy(question.sigma_angle / MGON, 6) * MGON
             noise = Noise(sigma_of(question, self.equipment, n, self.hold), angle)
         tilt_range = tidy(question.tilt_range / GON, 6) * GON
-        sizes = question.neglected_by(self.model) if with_neglected else {}
-        return _search(self.model.name, self.equipment.name, noise, tilt_range, (*sizes.items(),))
+        return _search(self.model.name, self.equipment.name, noise, tilt_range)
 
     def best(self, n: int, starts: int = 1) -> Candidate | None:
         """Calibration in the best n positions; None if so many are not allowed, or too few.
-
-        Where these miss the target by what the model neglects, positions that take it into account
-        are searched, too.
 
         Parameters
         ----------
@@ -89,18 +84,10 @@ class CalibrationKind:
         """
         if not self.least <= n <= self.most:
             return None
-        best = self._found(self.search(n), n, starts)
-        by_noise = best is not None and self.question.reached_by(best.tilt.of(NOISE))
-        if best is None or not by_noise or self.question.reached_by(best.tilt):
-            return best
-        robust = self._found(self.search(n, with_neglected=True), n, starts)
-        return min(filter(None, [best, robust]), key=lambda c: self.question.accuracy(c.tilt))
-
-    def _found(self, search: Search, n: int, starts: int) -> Candidate | None:
-        """Calibration in the positions of a search; None if they do not determine the model."""
-        directions = search.optimum(n, starts, bounded=False).directions
-        content = {"title": MINIMAX, "source": "accelstudy design"}
-        scheme = remember({**content, "directions": directions.tolist()}, f"{MINIMAX}-{n}")
+        search = self.search(n)
+        directions = search.optimum(n, starts, bounded=False).directions.tolist()
+        content = {"title": MINIMAX, "source": "accelstudy design", "directions": directions}
+        scheme = parse_scheme(content, f"{MINIMAX}-{n}")
         alone = replace(self.question, holds=(self.hold,), equipment=(self.equipment,))
         found = next(in_scheme(alone, scheme, [self.model]), None)
         return found and replace(found, search=search, starts=starts)
@@ -147,15 +134,8 @@ class CalibrationKind:
 
 
 @cache
-def _search(
-    model: str,
-    approach: str,
-    noise: Noise,
-    tilt_range: float,
-    neglected: tuple[tuple[str, float], ...],
-) -> Search:
-    known = get_model(model), get_approach(approach), noise, tilt_range
-    task = Task(*known, neglected=dict(neglected))
+def _search(model: str, approach: str, noise: Noise, tilt_range: float) -> Search:
+    task = Task(get_model(model), get_approach(approach), noise, tilt_range)
     return Search(task, get_criterion(MINIMAX, task))
 
 

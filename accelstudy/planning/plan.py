@@ -9,12 +9,9 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-import yaml
 
 from accelstudy.basics.errors import InputError
-from accelstudy.basics.plugins import file_key
 from accelstudy.basics.progress import say, show
-from accelstudy.basics.suggestions import study_again
 from accelstudy.basics.units import MGON
 from accelstudy.design.order import field_order
 from accelstudy.drawing.style import FULL
@@ -25,17 +22,12 @@ from accelstudy.planning.candidates import Candidate
 from accelstudy.planning.design import write_scheme
 from accelstudy.planning.question import Question
 from accelstudy.planning.reasons import limits
-from accelstudy.planning.simulated import study_of
 
 if TYPE_CHECKING:
     import pandas as pd
     from matplotlib.axes import Axes
 
 SHOWN = ["equipment", "model", "scheme", "n_positions", "hold_s", "minutes"]
-STUDY_HEAD = """\
-# The simulated candidates of a plan as a study, made by `accelstudy plan`. It reproduces their
-# numbers: {command}
-"""
 ANGLES, UNKNOWN = ("roll", "pitch"), np.full(2, np.nan)
 
 
@@ -75,12 +67,6 @@ class Plan(Result):
         """The most accurate candidate, of all or with one equipment, however long it takes."""
         chosen = [c for c in self.candidates if equipment in ("", c.equipment.name)]
         return most_accurate(self.question, chosen)
-
-    @property
-    def study(self) -> dict[str, Any]:
-        """Configuration of the study whose cells are the simulated candidates."""
-        chosen = sorted(self.ranked, key=lambda c: c is not self.first)
-        return study_of(self.question, chosen, self.seed, self.replicates)
 
     @property
     def exit_status(self) -> int:  # type: ignore[override]
@@ -142,10 +128,6 @@ class Plan(Result):
             raise InputError(self.verdict)
         provenance = {"config_hash": None, "seed": self.seed}
         write_table(folder / "plan.parquet", self.compared, provenance)
-        head = STUDY_HEAD.format(command=study_again(place / "study.yaml"))
-        study = {**file_key(), **self.study}
-        content = yaml.safe_dump(study, sort_keys=False, allow_unicode=True)
-        (folder / "study.yaml").write_text(head + content, encoding="utf-8")
         first = self.first
         directions = first.scheme.directions
         if first.search is not None:
@@ -171,11 +153,9 @@ class Plan(Result):
         show(f"{answer}\n\n{how_to}")
         say(f"\n{table}\n\n{reasons}\n\n{assumptions}\n")
         if place is None:
-            study = "a study that makes the numbers again"
-            say(f"--out FOLDER keeps the table, the figure, and {study}.")
+            say("--out FOLDER keeps the table, the figure and the positions.")
         else:
             say(f"plan, table and figure: {place}")
-            say(f"the same numbers again: {study_again(place / 'study.yaml')}")
 
 
 def _row(plan: Plan, c: Candidate) -> dict[str, Any]:
@@ -193,7 +173,6 @@ def _row(plan: Plan, c: Candidate) -> dict[str, Any]:
         "reaches": plan.question.reached_by(c.tilt),
         "rank": rank,
         "limited_by": limits(plan.question, c) if rank else None,
-        "cell": None if c.simulated is None else c.simulated.cell,
     }
     left = {"rms": c.tilt.rms, "rms_simulated": UNKNOWN, "rms_q95_simulated": UNKNOWN}
     both = np.nan

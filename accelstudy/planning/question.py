@@ -7,7 +7,6 @@ from dataclasses import dataclass
 from functools import cached_property
 from typing import TYPE_CHECKING
 
-from accelstudy.basics.arguments import tidy
 from accelstudy.data_sheets import DataSheet
 from accelstudy.effects import get_effect
 from accelstudy.planning.quantities import QUANTITIES
@@ -15,7 +14,6 @@ from accelstudy.planning.quantities import QUANTITIES
 if TYPE_CHECKING:
     from accelstudy.leveling.distribution import Tilt
     from accelstudy.planning.simulated import SimulatedTilt
-    from accelstudy.sensors.sensor import SensorModel
 
 HOLDS = (1.0, 2.0, 5.0, 10.0, 20.0, 30.0, 60.0, 120.0)
 """Durations of a hold that are tried, s."""
@@ -101,11 +99,6 @@ class Question:
             effect: usual_size(effect) if size is None else shares[effect] * size
             for effect, size in stated.items()
         }
-
-    def neglected_by(self, model: SensorModel) -> dict[str, float]:
-        """Effects that a model lacks and the sensor has, with their sizes to six digits."""
-        inside = [effect.name for effect in model.effects]
-        return {e: tidy(size, 6) for e, size in self.sizes.items() if size and e not in inside}
 
     @property
     def assumed(self) -> list[str]:

@@ -15,9 +15,7 @@ from accelstudy.basics.units import (  # noqa: F401
     MGON,
     angle_note,
     display_unit,
-    recorded_unit,
     to_display,
-    to_recorded,
 )
 from accelstudy.basics.wording import amount, interval, number, quantity_text, words
 from accelstudy.design.criteria import MINIMAX
@@ -132,10 +130,4 @@ def positions_command(candidate: Candidate) -> str:
     }
     usual = {"model": NINE, "sigma": "0.002m/s2", "robot-sigma": "3.2mgon", "approach": "robot"}
     given = (f"--{name} {text}" for name, text in options.items() if text != usual.get(name))
-    neglected = [f"--neglect {e}={_recorded(size, e)}" for e, size in task.neglected.items()]
-    return " ".join(["accelstudy design", *given, *neglected])
-
-
-def _recorded(size: float, effect: str) -> str:
-    unit = effect_unit(effect)
-    return f"{float(to_recorded(size, unit)):.8g}{recorded_unit(unit)}"
+    return " ".join(["accelstudy design", *given])

@@ -23,7 +23,7 @@ from accelstudy.positions.scheme import Scheme
 KEYS = ("scheme", "title", "source", "directions", "positions", "design")
 """Keys of a file. Only `directions` is required; the last two are for people and not read."""
 
-_read: dict[str, tuple[Scheme, dict[str, Any]]] = {}
+_read: dict[str, Scheme] = {}
 
 
 def is_scheme_file(text: str) -> bool:
@@ -41,27 +41,15 @@ def scheme_of_file(path: str | Path) -> Scheme:
     """
     content = read_layer(path)
     try:
-        return remember(content, Path(path).stem)
+        scheme = parse_scheme(content, Path(path).stem)
     except InputError as error:
         raise InputError(f"{path}: {error}") from None
-
-
-def remember(content: Mapping[str, Any], name: str) -> Scheme:
-    """Make a scheme of the content of a file, and keep it for `known_scheme`."""
-    scheme = parse_scheme(content, name)
-    held = {key: content[key] for key in KEYS[1:4] if content.get(key) is not None}
-    plain = {"scheme": scheme.name.partition("@")[0], **held}
-    return _read.setdefault(scheme.name, (scheme, plain))[0]
+    return _read.setdefault(scheme.name, scheme)
 
 
 def known_scheme(name: str) -> Scheme | None:
     """Return a scheme that was read from a file before, by its name with the digest."""
-    return _read[name][0] if name in _read else None
-
-
-def held(name: str) -> dict[str, Any] | None:
-    """Content of the file of such a scheme, as plain data for `remember`."""
-    return _read[name][1] if name in _read else None
+    return _read.get(name)
 
 
 def parse_scheme(content: Mapping[str, Any], name: str) -> Scheme:

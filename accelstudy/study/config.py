@@ -40,7 +40,7 @@ from accelstudy.files.validation import ConfigSection, Configuration, OneOrMore,
 from accelstudy.leveling.error import ATTITUDES, MAX_TILT_GON
 from accelstudy.noise_effects import NoiseEffect, get_noise_effect
 from accelstudy.schemes import Scheme, get_scheme, scheme_names
-from accelstudy.schemes.files import held, remember
+from accelstudy.schemes.files import known_scheme
 from accelstudy.sensors.models import MODELS, NINE, PRESETS, compose, get_model
 from accelstudy.sensors.sensor import SensorModel
 from accelstudy.simulation.hold_plan import HoldPlan
@@ -425,6 +425,7 @@ class Study(Configuration):
     retired = {  # noqa: RUF012
         "keep": "every calibration is stored in estimates/: leave it out",
         "control": "linear theory is always the control variate: leave it out",
+        "schemes": "write positions into a YAML file, and its path into `grids`",
         "rare": "quantiles of small shares, such as 1e-6, are in the table quantiles where "
         "replicates are enough: leave it out",
     }
@@ -451,11 +452,6 @@ class Study(Configuration):
     models: dict[Annotated[str, AfterValidator(_own_name)], Composition] = Field(
         default_factory=dict, description="models of your own: name and effects"
     )
-    schemes: dict[str, dict[str, Any]] = Field(
-        default_factory=dict,
-        description="positions of schemes that have no file, as `scheme`, `title`, `source` and "
-        "`directions`, by the names that `grids` has for them; `accelstudy plan` writes them",
-    )
     grids: list[Grid] = Field(default_factory=list, description="sets of cells")
     presets: Presets | None = Field(None, description="Table 1 of the paper")
     leveling: LevelingConfig = LevelingConfig()
@@ -477,24 +473,13 @@ class Study(Configuration):
         """Give each model the name under which it stands."""
         return {name: _composed(_specs(model.effects), name) for name, model in models.items()}
 
-    @field_validator("schemes")
-    @classmethod
-    def _schemes_of_files(cls, given: dict[str, dict[str, Any]]) -> dict[str, dict[str, Any]]:
-        """Remember these schemes before the grids name them."""
-        for name, content in given.items():
-            if (proper := remember(content, name).name) != name:
-                raise InputError(
-                    f"{name}: is the name of other positions; the name of these is {proper}"
-                )
-        return dict(given)
-
     @field_validator("grids", "sensitivity", mode="wrap")
     @classmethod
     def _with_own_models(
         cls, content: Any, parse: ValidatorFunctionWrapHandler, info: ValidationInfo
     ) -> Any:
-        """Parse what may name models and schemes that the configuration defines itself."""
-        if not {"models", "schemes"} <= info.data.keys():  # it is these that are wrong
+        """Parse what may name models that the configuration defines itself."""
+        if "models" not in info.data:  # it is these that are wrong
             return content
         before = OWN_MODELS.set(info.data["models"])
         try:
@@ -560,7 +545,7 @@ class Study(Configuration):
             changed = [f"{k}={_number_text(v)}" for k, v in settings.items() if v != usual[k]]
             effects = tuple(_specs(model.effects))
             simulated = tuple(_specs((self.simulated_effects or model).effects))
-            file = held(scheme.name)
+            file = known_scheme(scheme.name)
             yield Cell(
                 name="/".join([model.name, scheme.name, approach.name, *changed]),
                 model=model.name,
@@ -579,7 +564,7 @@ class Study(Configuration):
                 gravity=self.gravity_mps2,
                 truth=self.truth(dict.fromkeys([*effects, *simulated])),
                 holds=self.hold_plan,
-                directions=None if file is None else tuple(map(tuple, file["directions"])),
+                directions=None if file is None else tuple(map(tuple, file.directions.tolist())),
                 max_tilt=self.leveling.max_tilt_gon * GON,
                 attitudes=self.leveling.attitudes,
             )

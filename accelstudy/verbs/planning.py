@@ -112,7 +112,6 @@ def find_positions(
     gravity_sigma: Force = "0",
     criterion: str = "I",
     tilt_range: Annotated[Quantity, angle(GON / 10, 100 * GON)] = "50gon",
-    neglect: str | Sequence[str] = (),
     after: kinds.SchemeName | None = None,
     attitudes: Annotated[
         str, Names("attitudes", "accelstudy.design.spaces", "SPACES", True)
@@ -144,9 +143,6 @@ def find_positions(
         variance of the parameters; minimax: variance of the worse of roll and pitch.
     tilt_range : float in rad, or str with a unit
         Largest tilt at which the calibrated sensor is used.
-    neglect : str, or several
-        An effect that the model leaves out, though the tilt is to be good, as EFFECT or
-        EFFECT=SIZE. SIZE is the sd of its parameters, by default that of cheap equipment.
     after : str
         Scheme that has been measured already.
     attitudes : str
@@ -185,7 +181,7 @@ def advise(
     tilt_range: kinds.Tilt = "30gon",
     approach: kinds.UsualApproach = None,
     model: kinds.ModelName = "bias-scale-nonorthogonality",
-    prior: kinds.File | None = None,
+    prior: kinds.TypeFile = None,
     attitudes: Annotated[
         str | None, Names("attitudes", "accelstudy.sequential.choice", "SETS", True)
     ] = None,
@@ -210,8 +206,6 @@ def advise(
         Rms of roll and of pitch to reach, as 10mgon or 0.01deg.
     tilt_range : float in rad, or str with a unit
         Largest tilt at which the accuracy is wanted.
-    prior : path
-        An earlier calibration.json with the same model, or the type.yaml of a lot.
     attitudes : str
         Attitudes to choose from: cube (faces, edges, corners), grid (roll and pitch in steps of 25
         gon) or a scheme. [default: cube, with a robot grid]

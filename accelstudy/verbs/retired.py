@@ -22,6 +22,7 @@ KEYWORDS = {
     "find_positions": {
         "discriminate": "the report of a diagnosis has the positions that tell its rivals apart",
         "least_angle": "a repeated position tells as much as one apart; leave it out",
+        "neglect": "put the effect into the model: positions that estimate it leave as little",
         "prior": "`after` takes a scheme that was measured; a prior is for `advise`",
         "mountings": "`attitudes` takes a scheme, as a file of the attitudes that a mount allows",
     },

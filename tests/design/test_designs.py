@@ -85,14 +85,13 @@ def test_commands_take_the_file_for_a_scheme(made, tmp_path):
 
 
 def test_what_a_design_is_for_is_said(tmp_path):
-    path, asked = tmp_path / "d.yaml", ("--attitudes", "hand", "--neglect", "quadratic_scale")
+    path, asked = tmp_path / "d.yaml", ("--attitudes", "hand", "--criterion", "minimax")
     told = succeed("design", "--positions", 8, "--starts", 1, *asked, "--out", path).output
-    assert "the neglected effects included" in told
     share = float(told.partition("Efficiency at least ")[2].partition(" %")[0])
     assert 50 < share <= 100
     content = path.read_text(encoding="utf-8")
     assert "steps of 30°" in content
-    assert "d (robust)" in content
+    assert "d (minimax)" in content
     assert get_scheme(str(path)).n_positions == 8
 
 
@@ -122,7 +121,6 @@ def test_a_job_needs_no_file(tmp_path, monkeypatch):
     path = tmp_path / "some.yaml"
     path.write_text("directions: [[0, 0, 1], [0, 1, 0], [1, 0, 0]]\n")
     (cell,) = study(path).cells
-    plain = study(path, schemes={cell.scheme: files.held(cell.scheme)}).model_dump(mode="json")
     path.unlink()
     monkeypatch.setattr(files, "_read", {})
     same = pickle.loads(pickle.dumps(cell))
@@ -130,11 +128,6 @@ def test_a_job_needs_no_file(tmp_path, monkeypatch):
     np.testing.assert_array_equal(same.positions.directions, np.eye(3)[::-1])
     with pytest.raises(InputError, match="unknown scheme 'some@"):
         get_scheme(cell.scheme)
-    assert parse_study(plain).cells == [cell]  # as a plan writes it
-    np.testing.assert_array_equal(get_scheme(cell.scheme).directions, same.positions.directions)
-    plain["schemes"][cell.scheme]["directions"][0] = [0, 1, 1]
-    with pytest.raises(InputError, match=r"schemes.*is the name of other positions"):
-        parse_study(plain)
     assert make_study().cells[0].directions is None  # of schemes that come along
 
 
@@ -168,10 +161,6 @@ def asked(**given):
 
 @pytest.mark.parametrize(("given", "wrong"), [
     ({"criterion": "E"}, "unknown criterion 'E'"),
-    ({"criterion": "D", "neglect": ("cubic_scale",)}, "criterion D: effects that are neglected"),
-    ({"neglect": ("bias",)}, "'bias' is in the model"),
-    ({"neglect": ("quadratic_scale=5mm",)}, "neglect: quadratic_scale=5mm: .*unit must be"),
-    ({"neglect": ("cubic_scale=0ppm",)}, "must be more than 0"),
     ({"attitudes": "cub"}, "did you mean 'cube'"),
     ({"roll": (0.1, -0.1)}, "roll: the first angle must be less"),
     ({"sigma": -1.0}, "sigma: must be"),
@@ -181,10 +170,7 @@ def test_contradictory_wishes_are_said_in_one_line(given, wrong):
         asked(**given)
 
 
-def test_what_was_measured_before_and_what_is_neglected():
-    assert asked(neglect=("quadratic_scale=20ppm",)).task.neglected == {
-        "quadratic_scale": pytest.approx(2e-5)
-    }
+def test_what_was_measured_before():
     after = asked(approach="gravity", after="faces-6")
     assert after.task.missing(after.optimum(6, 1, bounded=False).directions) == ""
 

@@ -7,7 +7,7 @@ import pytest
 from optimal_schemes import TASK as STORED
 from usual import GRAVITY, NINE
 
-from accelstudy.adjustment import calibrate, whitened_jacobian
+from accelstudy.adjustment import whitened_jacobian
 from accelstudy.approaches import get_approach
 from accelstudy.basics.errors import InputError
 from accelstudy.basics.units import GON
@@ -36,7 +36,6 @@ BY_GRAVITY, BY_ROBOT = (Task(NINE, get_approach(name)) for name in ("gravity", "
 MCLAREN = get_scheme("mclaren-24").directions
 SEARCHED = 1e-3
 """Relative margin by which a search may find a variance that is smaller than a stored one."""
-NEGLECTED = {"quadratic_scale": 1e-4, "cubic_scale": 1e-5}
 
 
 def asked(task, name):
@@ -98,7 +97,7 @@ def test_observed_gravity_is_prior_information():
 
 @pytest.mark.parametrize("name", ["D", "A", "I", "minimax"])
 def test_gradients(name):
-    task = Task(NINE, GRAVITY, neglected={} if name in "DA" else NEGLECTED)
+    task = Task(NINE, GRAVITY)
     normal = task.normal(get_scheme("fibonacci-24").directions)
     criterion = get_criterion(name, task)
     turn = np.random.default_rng(1).standard_normal((2, *normal.shape))
@@ -106,38 +105,6 @@ def test_gradients(name):
         ahead, behind = (criterion.value(normal + h * change) for h in (1e-4, -1e-4))
         slope = np.sum(criterion.gradient(normal) * change)
         assert (ahead - behind) / 2e-4 == pytest.approx(slope, rel=1e-5, abs=1e-8)
-
-
-def test_the_error_by_a_neglected_effect_is_that_of_calibrations_without_it():
-    """Sessions of a sensor with the effect, adjusted without: linear theory against the rest."""
-    task = Task(NINE, GRAVITY, neglected={"quadratic_scale": 2e-4})
-    model, directions = task.extended, get_scheme("fibonacci-24").directions
-    f_b = cap_forces(task.tilt_range, 200)
-    squares = []
-    for axis in range(3):  # the effects of the axes are independent of each other
-        truth = np.zeros(12)
-        truth[9 + axis] = 2e-4
-        seen = session(model, truth, directions).observations(Noise())
-        fit = calibrate(NINE, GRAVITY, seen)
-        error = tilt_error(model, truth, NINE, fit.parameters[0], f_b)
-        squares.append(error.constant)
-    alone = rms_tilt(BY_GRAVITY, directions) ** 2
-    expected = alone + np.sum(squares, axis=0)
-    assert np.all(expected > 1.3 * alone)
-    np.testing.assert_allclose(rms_tilt(task, directions) ** 2, expected, rtol=2e-3)
-    value = get_criterion("I", task).value(task.normal(directions))
-    assert float(np.exp(value)) == pytest.approx(expected.mean(), rel=2e-3)
-
-
-def test_no_positions_are_below_the_bound_of_a_neglected_effect():
-    task = Task(NINE, GRAVITY, neglected={"quadratic_scale": 2.5e-3})
-    criterion = get_criterion("I", task)
-    found = Search(task, criterion).optimum(24, starts=1)
-    assert 0.9 < found.efficiency < 1
-    others = [random_directions(24, seed) for seed in range(50)]
-    assert min(criterion.value(task.normal(each)) for each in others) > found.value
-    plain = rms_tilt(task, get_scheme("i-optimal-24").directions)
-    assert np.all(rms_tilt(task, found.directions) < 0.5 * plain)
 
 
 # Known optima

@@ -246,20 +246,6 @@ def test_a_repeat_that_disagrees_too_was_not_bumped(begun):
     assert "`accelstudy diagnose` tells what is wrong or missing" in text
 
 
-# --- what is known before ------------------------------------------------------------------------
-
-
-def test_a_calibration_of_before_saves_positions(begun, sessions, tmp_path):
-    succeed("calibrate", sessions / "gravity", "--out", tmp_path / "before")
-    earlier = tmp_path / "before/calibration.json"
-    text = advise(begun(0, "robot"), "--prior", earlier, "--approach", "gravity")
-    assert "not determined" not in text
-    assert "tilt error left: roll " in text
-    assert text == advise(begun(0, "robot"), "--prior", earlier.parent, "--approach", "gravity")
-    message = error(begun(0), *WANTED, "--prior", earlier, "--model", "bias-scale")
-    assert "calibration.json: calibrates b_x, " in message
-
-
 # --- bad input -----------------------------------------------------------------------------------
 
 
