@@ -1,6 +1,6 @@
 """Gauss–Helmert adjustment, in general and for the calibration of an accelerometer."""
 
-from accelstudy.adjustment.calibration import calibrate, whitened_jacobian
+from accelstudy.adjustment.calibration import calibrate
 from accelstudy.adjustment.equations import CalibrationEquations
 from accelstudy.adjustment.gauss_helmert import (
     Adjustment,
@@ -18,5 +18,4 @@ __all__ = [
     "Observations",
     "adjust",
     "calibrate",
-    "whitened_jacobian",
 ]

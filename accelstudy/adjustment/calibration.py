@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import NDArray
 
 from accelstudy.adjustment.equations import CalibrationConditions, equations_of
 from accelstudy.adjustment.gauss_helmert import (
@@ -58,28 +58,6 @@ def calibrate(model: SensorModel, approach: Approach, observed: Observations) ->
         part = observed.sessions(slice(start, start + size))
         parts.append(CalibrationProblem.of(model, approach, part).adjust())
     return Adjustment.concatenate(parts)
-
-
-def whitened_jacobian(
-    model: SensorModel, approach: Approach, observed: Observations, parameters: ArrayLike
-) -> Array:
-    """Design matrix of the first session, scaled to unit weight, at given parameters.
-
-    Parameters
-    ----------
-    model, approach, observed : as in `calibrate`; the observations must fit the parameters
-    parameters : (u,) array, SI, without gravity
-
-    Returns
-    -------
-    (m, u') array; AᵀA is the normal matrix. With errors that all angles share, and with observed
-    gravity, columns and rows are added.
-    """
-    problem = CalibrationProblem.of(model, approach, observed.first(1))
-    x = problem.initial.copy()
-    x[0, : model.n_parameters] = parameters
-    weighted = np.flatnonzero(problem.weights)
-    return np.concatenate([problem.rows(x)[0], np.diag(np.sqrt(problem.weights))[weighted]])
 
 
 @dataclass(frozen=True)

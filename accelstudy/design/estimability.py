@@ -2,23 +2,21 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
-from functools import partial
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
-from accelstudy.adjustment import whitened_jacobian
 from accelstudy.adjustment.observations import Known
 from accelstudy.approaches import Approach
 from accelstudy.basics.units import STANDARD_GRAVITY
-from accelstudy.design.information import rank_of
+from accelstudy.design.information import Information, position_rows, prior_rows, rank_of
 from accelstudy.effects import HoldConditions
 from accelstudy.positions.points import evenly_spread
 from accelstudy.positions.scheme import Scheme
 from accelstudy.sensors.sensor import SensorModel
 from accelstudy.simulation.hold_plan import HoldPlan
-from accelstudy.simulation.sessions import Noise, session
+from accelstudy.simulation.sessions import Noise
 
 Array = NDArray[np.float64]
 
@@ -37,12 +35,12 @@ class Estimability:
     Attributes
     ----------
     parameter_names : tuple of str
-    rank : int, of the design matrix at the ideal sensor
+    rank : int, of the design matrix
     condition : float, of the design matrix with columns of unit length; inf if singular
     redundancy : int, r = conditions − unknowns
     not_estimable : tuple of str, parameters that the scheme cannot determine
     reason : str, why; empty if all is estimable
-    cofactors : (u, u) array, Q_xx of linear theory at the given parameters; NaN if not estimable
+    cofactors : (u, u) array, Q_xx of linear theory; NaN if not estimable
     """
 
     parameter_names: tuple[str, ...]
@@ -69,7 +67,6 @@ def estimability(
     model: SensorModel,
     approach: Approach,
     noise: Noise | None = None,
-    parameters: Array | None = None,
     gravity: float = STANDARD_GRAVITY,
     hold: HoldConditions | None = None,
     known: Known | None = None,
@@ -78,8 +75,8 @@ def estimability(
 ) -> Estimability:
     """Work out what a scheme determines, before any simulation.
 
-    Rank and condition are those at the ideal sensor (all parameters zero): what is singular there
-    is near-singular for every real sensor. The cofactors are taken at `parameters`.
+    It is that at the ideal sensor (all parameters zero): what is singular there is near-singular
+    for every real sensor, whose standard deviations differ by about its scale error.
 
     Noise gives any readings full rank. So by readings a combination of parameters counts as
     determined only if it shows by `ABOVE_NOISE` times what the noise adds to the design matrix.
@@ -91,7 +88,6 @@ def estimability(
     model : SensorModel
     approach : Approach
     noise : Noise, optional
-    parameters : (u,) array, SI, optional; the ideal sensor by default
     gravity : float, m/s²
     hold : HoldConditions, optional
         What a session knows of its positions beyond their directions (temperature, time, …).
@@ -101,19 +97,23 @@ def estimability(
         count, as unit vectors would have the sensor's errors in their directions.
     blur : float, m/s², noise of readings by which they are judged
     """
-    noise, ideal = noise or Noise(), np.zeros(model.n_parameters)
+    noise = noise or Noise()
     names = (*model.parameter_names, "g") if noise.sigma_gravity > 0 else model.parameter_names
     directions = scheme.directions if forces is None else -forces / gravity
-    design = partial(_design, (model, approach, noise, gravity, hold, known or {}))
-    a = design(directions, ideal)
+    before = prior_rows(model, noise, known)
+
+    def design(directions: Array) -> Array:
+        rows = position_rows(model, approach, noise, directions, gravity, hold)
+        return np.concatenate([rows.reshape(-1, len(names)), before])
+
+    a = design(directions)
     rank, condition, free = exact = rank_of(a)
     if blur and not free.any():
         shifts = blur / gravity * np.eye(3)
-        changes = np.concatenate([design(directions + shift, ideal) - a for shift in shifts])
+        changes = np.concatenate([design(directions + shift) - a for shift in shifts])
         rank, condition, free = rank_of(a, ABOVE_NOISE * changes)
     not_estimable = tuple(name for name, is_free in zip(names, free, strict=True) if is_free)
-    reason = ""
-    cofactors = np.full((len(names), len(names)), np.nan)
+    reason, cofactors = "", np.full((len(names), len(names)), np.nan)
     if not np.isfinite(a).all():
         reason = "the sigmas differ too much: the conditions have no weights to compute with"
     elif not_estimable:
@@ -124,28 +124,14 @@ def estimability(
             + (f" with a noise of {1e3 * blur:.2g} mm/s²" if rank < exact[0] else "")
         )
     else:
-        if parameters is not None:
-            a = design(scheme.directions, np.asarray(parameters, dtype=float))
-        scale = np.linalg.norm(a, axis=0)
-        cofactors = np.linalg.inv((a / scale).T @ (a / scale)) / np.outer(scale, scale)
+        cofactors = Information.of(a).covariance
     redundancy = len(a) - len(names)
     return Estimability(names, rank, condition, redundancy, not_estimable, reason, cofactors)
 
 
-SetUp = tuple[SensorModel, Approach, Noise, float, HoldConditions | None, Known]
-
-
-def _design(set_up: SetUp, directions: Array, parameters: Array) -> Array:
-    """Design matrix (conditions, u) with unit weights."""
-    model, approach, noise, gravity, hold, known = set_up
-    ideal = session(model, parameters, directions, gravity, hold)
-    observed = replace(ideal.observations(noise), known=known)
-    return whitened_jacobian(model, approach, observed, parameters)
-
-
 def is_blind(model: SensorModel, approach: Approach, noise: Noise, gravity: float) -> bool:
     """Whether an approach cannot determine a model in any scheme, whatever the conditions are."""
+    directions = evenly_spread(SUFFICIENT_POSITIONS)
     hold = EVERYTHING_VARIES.hold(SUFFICIENT_POSITIONS)
-    set_up: SetUp = (model, approach, noise, gravity, hold, {})
-    a = _design(set_up, evenly_spread(SUFFICIENT_POSITIONS), np.zeros(model.n_parameters))
-    return rank_of(a)[0] < a.shape[1]
+    rows = position_rows(model, approach, noise, directions, gravity, hold)
+    return not Information.of(rows, prior_rows(model, noise)).determined

@@ -18,7 +18,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from accelstudy.adjustment.equations import equations_of
 from accelstudy.adjustment.gauss_helmert import whitened_design
-from accelstudy.adjustment.observations import AngleErrors
+from accelstudy.adjustment.observations import AngleErrors, Known
 from accelstudy.approaches import Approach
 from accelstudy.basics.errors import InputError
 from accelstudy.basics.units import STANDARD_GRAVITY
@@ -248,8 +248,7 @@ def position_rows(
     model : SensorModel
     approach : Approach
     noise : Noise
-        With `sigma_gravity` > 0 gravity is the last parameter. Its observation belongs to no
-        position, so its weight 1/σ² is not in the rows.
+        With `sigma_gravity` > 0 gravity is the last parameter; its observation is in `prior_rows`.
     directions : (k, 3) array of unit vectors, gravity in the body frame
     gravity : float, m/s²
     hold : HoldConditions, optional
@@ -288,3 +287,24 @@ def position_rows(
     at = conditions.linearise(x, observed.T[:, None], force.T[:, None])
     rows = whitened_design(at, variance.T)[:, :, 0]
     return np.ascontiguousarray(rows.transpose(2, 0, 1))
+
+
+def prior_rows(model: SensorModel, noise: Noise, known: Known | None = None) -> Array:
+    """Rows of what is known of the parameters, and of gravity, before the first position.
+
+    Parameters
+    ----------
+    model, noise : as in `position_rows`
+    known : mapping, optional, what is known of parameters a priori, as in `Observations`
+
+    Returns
+    -------
+    (k, u') array, a row of unit weight for each parameter that is known
+    """
+    sigmas = {name: sigma for name, (_, sigma) in (known or {}).items()}
+    roots = [
+        1 / sigmas[name] if name in sigmas else np.sqrt(weight)
+        for name, weight in zip(model.parameter_names, model.prior_weights, strict=True)
+    ]
+    roots += [1 / noise.sigma_gravity] if noise.sigma_gravity > 0 else []
+    return np.diag(roots)[np.array(roots) > 0]

@@ -12,7 +12,7 @@ from accelstudy.approaches import Approach
 from accelstudy.basics.errors import InputError
 from accelstudy.basics.units import GON
 from accelstudy.design.estimability import estimability
-from accelstudy.design.information import Information, position_rows
+from accelstudy.design.information import Information, position_rows, prior_rows
 from accelstudy.leveling.error import ATTITUDES, MAX_TILT_GON, cap_forces, tilt_error
 from accelstudy.positions.points import evenly_spread
 from accelstudy.positions.scheme import Scheme
@@ -89,8 +89,8 @@ class Task:
     @cached_property
     def _before(self) -> Information:
         """What is known before the first position, SI."""
-        known = np.diag([(name == "g") / (self.noise.sigma_gravity or 1.0) for name in self.names])
-        return Information.of(known, *(self.rows(self.measured) if len(self.measured) else ()))
+        measured = self.rows(self.measured) if len(self.measured) else ()
+        return Information.of(prior_rows(self.model, self.noise), *measured)
 
     @cached_property
     def prior(self) -> Array:

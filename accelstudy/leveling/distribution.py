@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass, replace
-from functools import cache, cached_property
+from functools import cached_property
 
 import numpy as np
 import scipy
@@ -14,28 +13,18 @@ from accelstudy.leveling.error import TiltError
 
 Array = NDArray[np.float64]
 
-DIRECTIONS = 4096
-"""Directions over which a share is averaged."""
 FROM = (0.9, 0.5, 0.2, 0.02, 0.0)
-INEXACT = {True: (1.5e-4, 1.2e-3, 2e-3, 6.5e-3, 0.03), False: (2e-3, 5e-3, 0.01, 0.1, 0.1)}
+INEXACT = {True: (5e-4, 2e-3, 6e-3, 0.02, 0.08), False: (4e-3, 0.015, 0.02, 1.0, 1.0)}
 """Relative errors of quantiles by their number (rms over the set-ups of the paper's study), from
 probabilities of `FROM` on: of the larger of roll and pitch, and of any where there is an offset."""
-NEGLIGIBLE = 1e-4
-"""Share of the mean square that neglected dimensions have together."""
 NODES = 28
 """Nodes of the inverse Laplace transform; its error is below 1e-9."""
 CENTRAL = 1e-6
 """Offsets below this share of the mean square count as none."""
-STEPS = 40
-"""Most steps of the secant method for a quantile."""
-LEAST_STEP = 1e-6
-"""Shorter ones, of the logarithm of a quantile, do not tell a slope."""
-LAST_STEP = 1e-7
-"""After a step that is shorter for all quantiles, they are found."""
-LENGTHS = 40_001
-"""Lengths of which shares are tabulated; between them, shares are right to 1e-8."""
-
-
+SQUARES = np.geomspace(1e-7, 60.0, 700)
+"""Squares, relative to the mean ones, between which shares are interpolated, to 3e-5."""
+ROUNDING = 1e-12
+"""Shares that are nearer to 0 or 1 are not told apart."""
 NOISE = "noise"
 STEPS_OF_BOTH = 17
 """Errors at which the share of calibrations below is computed, to interpolate between."""
@@ -112,11 +101,11 @@ def scaled_chi_squared(mean: Array, variance: Array) -> tuple[Array, Array]:
 class TiltDistribution:
     """The rms over attitudes of the errors of roll and of pitch, and the larger of the two.
 
-    Of normal errors the squares are quadratic forms in u standard normals y. In a fixed direction
-    of y, its length has a χ distribution, so that the share below a bound is known; the mean over
-    directions that are spread evenly is the share. Where the forms have no offset, the shares of
-    roll and pitch by themselves are computed to nine digits by the inverse of a Laplace transform
-    (fixed Talbot method; Abate & Valkó 2004), and correct the share of the larger.
+    Of normal errors the squares are quadratic forms in standard normals y. Where they have no
+    offset, the share below a bound is the inverse of a known Laplace transform (fixed Talbot
+    method; Abate & Valkó 2004). An offset makes them narrow, and a χ² of the same mean, variance
+    and skewness has that share nearly (Pearson 1959, Biometrika 46, 364). Both angles at once have
+    a normal copula, with the correlation of their squares, which is 0.2 at most.
 
     Parameters
     ----------
@@ -134,58 +123,32 @@ class TiltDistribution:
         return self.tilt.constant + spread
 
     def quantile(self, probabilities: ArrayLike) -> Array:
-        """Quantiles of roll, of pitch and of the larger, (3, k), rad.
-
-        They are solved for from those of the scaled χ² of equal mean and variance.
-        """
-        wanted = scipy.special.ndtri(np.asarray(probabilities, dtype=float))
-        forms, linear = self._forms
-        variance = 2 * np.einsum("aij,aij->a", forms, forms) + 4 * (linear**2).sum(axis=1)
-        factor, freedom = scaled_chi_squared(self.mean_squares[:, None], variance[:, None])
-        start = np.sqrt(scipy.special.chdtri(freedom, scipy.special.ndtr(-wanted)) * factor)
-        start = np.log(np.vstack([start, start.max(axis=0)]))
-        return np.exp(_solved(self._scores, start, wanted))
+        """Quantiles of roll, of pitch and of the larger, (3, k), rad."""
+        low, high = self.mean_squares.min(), self.mean_squares.max()
+        squares = np.unique(np.concatenate([low * SQUARES, high * SQUARES]))
+        roll, pitch = shares = [self._share(angle, squares) for angle in (0, 1)]
+        both = roll * pitch + _dependence(*scipy.special.ndtri(shares), self._correlation)
+        wanted, at = scipy.special.ndtri(np.asarray(probabilities, dtype=float)), np.log(squares)
+        scores = scipy.special.ndtri(_increasing([roll, pitch, both]))
+        return np.exp([np.interp(wanted, each, at) / 2 for each in scores])
 
     def relative_error(self, probabilities: ArrayLike) -> Array:
-        """Relative errors of quantiles as of `quantile` by the directions, (3, k)."""
+        """Relative errors of quantiles as of `quantile`, (3, k)."""
         p = np.asarray(probabilities, dtype=float)
         each = np.select([p >= least for least in FROM], INEXACT[self._central])
         single = np.zeros_like(each) if self._central else each
         return np.stack([single, single, each])
 
-    def _scores(self, at: Array) -> Array:
-        """Normal scores of the shares below bounds exp(at) of roll, of pitch and of the larger."""
-        roll, pitch, both = np.exp(at)
+    def _share(self, angle: int, squares: Array) -> Array:
+        """Share of the squared errors of one angle that is below given ones, ascending, (k,)."""
         if self._central:
-            shares = [self._exact(0, roll), self._exact(1, pitch), self._share_of_both(both)]
-            return np.asarray(scipy.special.ndtri(shares))
-        near, far = self._ends(both)
-        larger = np.stack([near.max(axis=0), far.min(axis=0)])
-        ends = np.stack([self._ends(roll)[:, 0], self._ends(pitch)[:, 1], larger], axis=1)
-        below = self._length(ends[1]) - self._length(ends[0])
-        return np.asarray(scipy.special.ndtri(np.maximum(below, 0.0).mean(axis=2)))
-
-    def _share_of_both(self, bounds: Array) -> Array:
-        """Share of the larger error that is below bounds (k,), without offset.
-
-        By directions, corrected by what they miss of the shares of roll and pitch by themselves.
-        """
-        single = self._length(self._ends(bounds)[1])
-        both, mean = single.min(axis=0), single.mean(axis=2)
-        missed, larger = [self._exact(a, bounds) for a in (0, 1)] - mean, both.mean(axis=1)
-        for i, each in enumerate(both):
-            apart = single[:, i] - mean[:, i, None]
-            slope = np.linalg.lstsq(apart @ apart.T, apart @ (each - larger[i]), rcond=1e-9)[0]
-            larger[i] += slope @ missed[:, i]
-        return np.clip(larger, 0.0, 1.0)
-
-    def _ends(self, bounds: Array) -> Array:
-        """Lengths of y from and to which errors are below bounds (k,): (2, angle, k, direction)."""
-        constant, linear, square = (each[:, None] for each in self._along[:3])
-        root = linear**2 - square * (constant[..., None] - bounds[:, None] ** 2)
-        half = np.sqrt(np.maximum(root, 0.0))
-        far = np.where(root > 0, np.maximum((half - linear) / square, 0.0), 0.0)
-        return np.stack([np.maximum((-linear - half) / square, 0.0), far])
+            return _increasing(_sum_of_squares(np.linalg.eigvalsh(self._forms[0][angle]), squares))
+        form, linear = (each[angle] for each in self._forms)
+        variance = self._covariances[angle, angle]
+        third = 8 * np.trace(form @ form @ form) + 24 * linear @ form @ linear
+        freedom = 8 * variance**3 / third**2
+        apart = (squares - self.mean_squares[angle]) * np.sqrt(2 * freedom / variance)
+        return _increasing(scipy.special.chdtr(freedom, np.maximum(freedom + apart, 0.0)))
 
     @cached_property
     def _forms(self) -> tuple[Array, Array]:
@@ -196,115 +159,48 @@ class TiltDistribution:
         return root.T @ self.tilt.quadratic @ root, self.tilt.linear @ root
 
     @cached_property
+    def _covariances(self) -> Array:
+        """Covariances of the squared errors of roll and of pitch, (2, 2)."""
+        forms, linear = self._forms
+        return np.asarray(2 * np.einsum("aij,bij->ab", forms, forms) + 4 * linear @ linear.T)
+
+    @property
+    def _correlation(self) -> float:
+        (roll, across), (_, pitch) = self._covariances
+        return float(across / np.sqrt(roll * pitch))
+
+    @cached_property
     def _central(self) -> bool:
         """Whether the squared errors have no offset."""
         offset = self.tilt.constant + np.abs(self._forms[1]).sum(axis=1) ** 2 / self.mean_squares
         return bool(np.all(offset < CENTRAL * self.mean_squares))
 
-    @cached_property
-    def _along(self) -> tuple[Array, Array, Array, int]:
-        """Constant (2,), linear and square (2, d) of the squared error over the length of y, and u.
 
-        Without offset, y has only the dimensions that matter; the others count by their mean.
-        """
-        forms, linear = self._forms
-        if not self._central:
-            along = _directions(len(linear[0]))
-            return self.tilt.constant, linear @ along.T, _squares(forms, along), len(linear[0])
-        both = forms / np.trace(forms, axis1=1, axis2=2)[:, None, None]
-        sizes, vectors = np.linalg.eigh(both.sum(axis=0))
-        kept = np.cumsum(sizes) > NEGLIGIBLE * sizes.sum()
-        rotated = vectors.T @ forms @ vectors
-        rest = np.diagonal(rotated, axis1=1, axis2=2)[:, ~kept].sum(axis=1)
-        count = int(kept.sum())
-        squares = _squares(rotated[:, kept][:, :, kept], _directions(count))
-        return rest, np.zeros_like(squares), squares, count
+def _dependence(x: Array, y: Array, correlation: float) -> Array:
+    """How much more often than if they were independent two normal variables are both below x, y.
 
-    @property
-    def _length(self) -> Callable[[Array], Array]:
-        """Share of the lengths of y that are below given ones."""
-        return _lengths(self._along[3])
-
-    def _exact(self, angle: int, bounds: Array) -> Array:
-        """Share below bounds (k,) of the error of one angle without offset."""
-        sizes = np.linalg.eigvalsh(self._forms[0][angle])
-        nodes, weights = _talbot()
-        p = nodes[:, None] / bounds**2
-        transform = 1 / p
-        for size in sizes[sizes > np.finfo(float).eps * sizes[-1]]:
-            transform /= np.sqrt(1 + 2 * size * p)
-        return np.clip((weights @ transform).real / bounds**2, 0.0, 1.0)
-
-
-def _solved(scores: Callable[[Array], Array], start: Array, wanted: Array) -> Array:
-    """Arguments of wanted normal scores.
-
-    By the secant method. A step that leaves the bounds seen so far ends half way between them.
+    It is the integral of their density over the correlation (Plackett 1954).
     """
-    before, at = start - 0.1, start
-    below, slope = scores(before), np.ones_like(start)
-    low = np.where(below < wanted, before, -np.inf)
-    high = np.where(below > wanted, before, np.inf)
-    with np.errstate(invalid="ignore", divide="ignore"):
-        for _ in range(STEPS):
-            here = scores(at)
-            low = np.where(here < wanted, np.maximum(low, at), low)
-            high = np.where(here > wanted, np.minimum(high, at), high)
-            found = (here - below) / (at - before)
-            known = np.isfinite(found) & (found > 0) & (np.abs(at - before) > LEAST_STEP)
-            slope = np.where(known, found, slope)
-            # Where a share is 0 or 1, the quantile is some way further.
-            step = np.where(np.isfinite(here), (wanted - here) / slope, -0.5 * np.sign(here))
-            to = at + np.clip(step, -1.0, 1.0)
-            half = (low + high) / 2
-            to = np.where(((to < low) | (to > high)) & np.isfinite(half), half, to)
-            before, below, at = at, here, to
-            if np.all(np.abs(at - before) < LAST_STEP):
-                break
-    return at
+    nodes, weights = np.polynomial.legendre.leggauss(6)
+    r = correlation * (1 + nodes[:, None]) / 2
+    density = np.exp(-(x * x - 2 * r * x * y + y * y) / (2 * (1 - r * r))) / np.sqrt(1 - r * r)
+    return np.asarray(correlation / 2 * weights @ density / (2 * np.pi))
 
 
-def _squares(forms: Array, along: Array) -> Array:
-    """Values (2, d) of quadratic forms (2, u, u) in directions (d, u)."""
-    values = np.stack([np.einsum("du,du->d", along @ form, along) for form in forms])
-    return np.asarray(np.maximum(values, np.finfo(float).tiny))
+def _increasing(shares: ArrayLike) -> Array:
+    """Shares (..., k) of ascending bounds, free of rounding and of 0 and 1."""
+    clipped = np.clip(shares, ROUNDING, 1 - ROUNDING)
+    return np.asarray(np.maximum.accumulate(clipped, axis=-1))
 
 
-@cache
-def _directions(u: int) -> Array:
-    """Directions in u dimensions, (d, u), from points that fill the unit cube evenly.
-
-    They are the points of Roberts' sequence: multiples, modulo 1, of powers of 1/φ, where φ solves
-    φ^(u+1) = φ + 1.
-    """
-    phi = 2.0
-    for _ in range(60):
-        phi = (1 + phi) ** (1 / (u + 1))
-    points = (0.5 + np.outer(np.arange(1, DIRECTIONS + 1), phi ** -np.arange(1.0, u + 1))) % 1
-    normal = scipy.special.ndtri(points)
-    return np.asarray(normal / np.linalg.norm(normal, axis=1, keepdims=True))
-
-
-@cache
-def _lengths(u: int) -> Callable[[Array], Array]:
-    """The share of standard normals in u dimensions whose length is below given ones."""
-    length, step = np.linspace(0.0, np.sqrt(u) + 9.0, LENGTHS, retstep=True)
-    below = scipy.special.gammainc(u / 2, length**2 / 2)
-    slope = np.append(np.diff(below), 0.0)
-
-    def share(at: Array) -> Array:
-        at = np.minimum(at * (1 / step), LENGTHS - 1)
-        place = at.astype(np.intp)
-        return np.asarray(below[place] + (at - place) * slope[place])
-
-    return share
-
-
-@cache
-def _talbot() -> tuple[Array, Array]:
-    """Nodes and weights: f(t) is the real part of Σ weight F(node / t) / t."""
+def _sum_of_squares(sizes: Array, bounds: Array) -> Array:
+    """Share of Σ sizeᵢ yᵢ², of standard normals y, that is below bounds (k,)."""
     angle = np.arange(1, NODES) * np.pi / NODES
     cot = 1 / np.tan(angle)
     nodes = 2 * NODES / 5 * np.concatenate([[1.0], angle * (cot + 1j)])
     weights = np.exp(nodes) * np.concatenate([[0.5], 1 + 1j * angle * (1 + cot**2) - 1j * cot])
-    return nodes, 2 / 5 * weights
+    p = nodes[:, None] / bounds
+    transform = 1 / p
+    for size in sizes[sizes > np.finfo(float).eps * sizes[-1]]:
+        transform /= np.sqrt(1 + 2 * size * p)
+    return np.asarray(2 / 5 * (weights @ transform).real / bounds)

@@ -19,7 +19,6 @@ from accelstudy.files.outputs import PLAN
 from accelstudy.pages.result import Result
 from accelstudy.planning import wording
 from accelstudy.planning.candidates import Candidate
-from accelstudy.planning.design import write_scheme
 from accelstudy.planning.question import Question
 from accelstudy.planning.reasons import limits
 
@@ -123,6 +122,7 @@ class Plan(Result):
         from accelstudy.drawing.saving import save
         from accelstudy.drawing.style import DPI, STYLE, new_figure
         from accelstudy.files.tables import write_table
+        from accelstudy.planning.design import write_scheme
 
         if not self.ranked:
             raise InputError(self.verdict)

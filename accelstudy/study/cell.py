@@ -107,8 +107,7 @@ class Cell:
     def estimability(self) -> Estimability:
         """What the positions determine."""
         set_up = self.positions, self.estimated_model, self.conditions, self.noise
-        truth = self.estimated_model.vector(self.truth)
-        return estimability(*set_up, truth, self.gravity, self.hold)
+        return estimability(*set_up, self.gravity, self.hold)
 
     @cached_property
     def linear_theory(self) -> LinearTheory | None:

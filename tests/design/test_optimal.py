@@ -7,7 +7,7 @@ import pytest
 from optimal_schemes import TASK as STORED
 from usual import GRAVITY, NINE
 
-from accelstudy.adjustment import whitened_jacobian
+from accelstudy.adjustment.calibration import CalibrationProblem
 from accelstudy.approaches import get_approach
 from accelstudy.basics.errors import InputError
 from accelstudy.basics.units import GON
@@ -56,13 +56,12 @@ def test_the_rows_of_an_ideal_sensor_are_those_of_a_session_without_errors(
     approach, noise, effects
 ):
     model = get_model(f"bias-scale-nonorthogonality+{effects}")
-    directions, by, ideal = random_directions(20), get_approach(approach), np.zeros(40)
+    directions, by = random_directions(20), get_approach(approach)
     hold = HoldConditions(temperature=np.linspace(0, 30, 20), yaw=np.linspace(0, 3, 20))
     rows = position_rows(model, by, noise, directions, hold=hold)
-    ideal = ideal[: model.n_parameters]
-    seen = session(model, ideal, directions, hold=hold).observations(noise)
-    whole = whitened_jacobian(model, by, seen, ideal)[: rows.shape[0] * rows.shape[1]]
-    of_session = whole.reshape(by.n_conditions, 20, -1).swapaxes(0, 1)
+    ideal = session(model, np.zeros(model.n_parameters), directions, hold=hold)
+    problem = CalibrationProblem.of(model, by, ideal.observations(noise))
+    of_session = problem.rows(problem.initial)[0].reshape(by.n_conditions, 20, -1).swapaxes(0, 1)
     np.testing.assert_allclose(rows, of_session, rtol=1e-12, atol=1e-12 * np.abs(rows).max())
 
 

@@ -107,7 +107,7 @@ SIGMA_FORCE = 0.002
 
 
 def shares_of(scheme, roll, pitch):
-    found = estimability(get_scheme(scheme), NINE, GRAVITY, Noise(), PAPER)
+    found = estimability(get_scheme(scheme), NINE, GRAVITY, Noise())
     return leveling_shares(roll, pitch, SIGMA_FORCE, NINE, PAPER, found.cofactors)
 
 
@@ -123,7 +123,7 @@ def test_the_slope_is_the_derivative():
 
 def test_total_effects_are_those_of_the_paper():
     """The linear ones beside the Shapley effects, against Sobol's method."""
-    found = estimability(get_scheme("mclaren-24"), NINE, GRAVITY, Noise(), PAPER)
+    found = estimability(get_scheme("mclaren-24"), NINE, GRAVITY, Noise())
     sampled = leveling_sensitivity([0, 50], [25], SIGMA_FORCE, 256, 20, 1, NINE, PAPER, found.sigma)
     table = shares_of("mclaren-24", [0, 50], [25])
     keys = ["output", "roll_gon", "pitch_gon", "input"]
