@@ -1,8 +1,7 @@
 """A calibration as functions in C99, generated from the formulas of its effects.
 
-The output of a sensor is evaluated in stages: most effects act on the force in the sensitive axes,
-and those that act last on the output that all others leave. Each stage is solved by Newton's
-method, with as many steps as it takes wherever the calibration holds.
+The force in the sensitive axes is solved for by Newton's method, with as many steps as it takes
+wherever the calibration holds.
 """
 
 from __future__ import annotations
@@ -10,7 +9,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from functools import cache
 from itertools import islice
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -22,14 +21,12 @@ from accelstudy.campaign.calibration.sensor_calibration import (
     RANGE_MARGIN,
     SensorCalibration,
 )
-from accelstudy.effects import HoldConditions, get_effect
+from accelstudy.effects import get_effect
 from accelstudy.effects.base import expressions
 from accelstudy.effects.components import AXES
 from accelstudy.effects.hold_symbols import HoldSymbols
 from accelstudy.pages import render_text
 from accelstudy.positions.points import evenly_spread
-from accelstudy.sensors.models import compose
-from accelstudy.sensors.sensor import SensorModel
 from accelstudy.symbolic.algebra import sp
 from accelstudy.symbolic.tracing import derivative, symbols
 
@@ -69,15 +66,20 @@ def c_header(calibration: SensorCalibration, real: str = "float") -> str:
     whole = np.round(offset)
     linear = calibration.mending @ frame.matrix * raw.scale
     constant = linear @ (whole - offset)
+    lines, output, columns, steps = list[str](), list[str](), set[str](), 1
     if affine := model.affine(p):
-        stages, (k, bias) = [], affine
+        k, bias = affine
         k = frame.matrix.T @ k
-        output = []
         force = write.affine("force", k @ linear, "reading", whole, k @ (constant - bias))
     else:
-        stages, body = _stages(calibration, write), frame.matrix.T @ model.axes_matrix(p)
+        out, slope = _output(calibration)
+        entries = {f"slope[{i}][{j}]": slope[i, j] for i in range(3) for j in range(3)}
+        lines = write.assigned(_entries("output", out) | entries)
+        columns = {str(symbol) for symbol in out.free_symbols - {*symbols(*FORCE)}}
+        steps = _steps(calibration) if slope.free_symbols & {*symbols(*FORCE)} else 1
+        body = frame.matrix.T @ model.axes_matrix(p)
         output = write.affine("output", linear, "reading", whole, constant)
-        force = write.affine("force", body, "output", np.zeros(3), np.zeros(3))
+        force = write.affine("force", body, "f", np.zeros(3), np.zeros(3))
     return render_text(
         "campaign/calibration/calibration.h.j2",
         version=__version__,
@@ -89,9 +91,9 @@ def c_header(calibration: SensorCalibration, real: str = "float") -> str:
         bound_mgon=MAX_SOLUTION_ERROR / calibration.gravity / MGON,
         largest=FORCES[-1],
         rounding=MAX_ROUNDING_ERROR,
-        stages=stages,
-        columns={column for stage in stages for column in stage.columns},
-        steps=max((stage.steps for stage in stages), default=1),
+        lines=lines,
+        columns=columns,
+        steps=steps,
         output=output,
         force=force,
         real=real,
@@ -99,56 +101,34 @@ def c_header(calibration: SensorCalibration, real: str = "float") -> str:
     )
 
 
-class _Stage(NamedTuple):
-    """Effects that act on the same force.
-
-    Attributes
-    ----------
-    name : str, of the function in C
-    lines : list of str, of C, which evaluate the output and its slope
-    columns : set of names of what the effects need besides the force
-    steps : int, Newton steps that solve for the force
-    """
-
-    name: str
-    lines: list[str]
-    columns: set[str]
-    steps: int
-
-
-def _stages(calibration: SensorCalibration, write: _Writer) -> list[_Stage]:
-    """Stages of the output; the first is of the force in the sensitive axes."""
-    model, g = calibration.model, calibration.gravity
-    sizes = np.concatenate([part * g * evenly_spread(DIRECTIONS) for part in FORCES])
-    force, hold = calibration.with_conditions(sizes, model.hold_columns, RANGE_MARGIN)
-    f = symbols(*FORCE)
-    stages = []
-    for name, last in (("accel_output", False), ("accel_last", True)):
-        specs = tuple(effect.spec for effect in model.effects if effect.last == last)
-        own = [effect.last == last for effect in model.effects for _ in effect.parameters]
-        if specs:
-            part, p = compose(model.name, specs), calibration.parameters[own]
-            values = zip(symbols(*part.parameter_names, "g"), [*p, g], strict=True)
-            numbers = {symbol: sp.Float(value) for symbol, value in values}
-            added, slopes = zip(*map(_formulas, specs), strict=True)
-            output = (sp.Matrix(f) + sum(added, sp.zeros(3, 1))).xreplace(numbers)
-            slope = (sp.eye(3) + sum(slopes, sp.zeros(3))).xreplace(numbers)
-            entries = {f"slope[{i}][{j}]": slope[i, j] for i in range(3) for j in range(3)}
-            lines = write.assigned(_entries("output", output) | entries)
-            columns = {str(symbol) for symbol in output.free_symbols - {*f}}
-            force = part.sense(force, p, g, hold)
-            steps = _steps(part, p, force, g, hold) if slope.free_symbols & {*f} else 1
-            stages.append(_Stage(name, lines, columns, steps))
-    return stages
+def _output(calibration: SensorCalibration) -> tuple[Any, Any]:
+    """Output (3, 1) for a force in the sensitive axes, and its derivative by the force (3, 3)."""
+    model, force = calibration.model, symbols(*FORCE)
+    output, slope = sp.Matrix(force), sp.eye(3)
+    for last in (False, True):  # those that act last take what all others leave
+        added, slopes = sp.zeros(3, 1), sp.eye(3)
+        for effect in model.effects:
+            if effect.last == last:
+                formula, by_force = _formulas(effect.spec)
+                added, slopes = added + formula, slopes + by_force
+        at = dict(zip(force, output, strict=True))
+        output, slope = output + added.xreplace(at), slopes.xreplace(at) * slope
+    names, values = (*model.parameter_names, "g"), [*calibration.parameters, calibration.gravity]
+    numbers = dict(zip(symbols(*names), map(sp.Float, values), strict=True))
+    return output.xreplace(numbers), slope.xreplace(numbers)
 
 
-def _steps(model: SensorModel, p: Array, output: Array, g: float, hold: HoldConditions) -> int:
-    """Count the steps to an output (n, 3) until the last is below the bound.
+def _steps(calibration: SensorCalibration) -> int:
+    """Count the steps to forces of all sizes, until the last is below the bound.
 
     Outputs that no force explains do not count.
     """
+    model, p, g = calibration.model, calibration.parameters, calibration.gravity
+    forces = np.concatenate([part * g * evenly_spread(DIRECTIONS) for part in FORCES])
+    forces, hold = calibration.with_conditions(forces, model.hold_columns, RANGE_MARGIN)
     sizes: list[Array] = []
     with np.errstate(all="ignore"):
+        output = model.sense(forces, p, g, hold)
         for _, step in islice(model.newton(output, p, g, hold), MAX_STEPS):
             sizes.append(np.abs(step).sum(axis=1))
             if np.all(sizes[-1] < MAX_SOLUTION_ERROR):

@@ -377,11 +377,10 @@ def campaign_estimability(
 
 def _cause(campaign: Campaign, model: SensorModel, theory: Estimability) -> str:
     """Name the probable reason why an adjustment does not converge."""
-    more = "; `accelstudy diagnose` looks for more"
     if (gross := recognise(campaign)) is not None:
-        what = f"{gross.reason}, and no calibration fits that"
-        return f"this looks like a gross error ({words(gross.name)}): {what}{more}"
-    why = f"a gross error in the data or a wrong unit is the usual cause{more}"
+        what = f"{gross.reason}, and no calibration fits that; `accelstudy diagnose` mends it"
+        return f"this looks like a gross error ({words(gross.name)}): {what}"
+    why = "a gross error in the data or a wrong unit is the usual cause"
     if theory.condition > MAX_CONDITION:
         why = (
             f"the {campaign.n_positions} positions hardly determine it (condition "

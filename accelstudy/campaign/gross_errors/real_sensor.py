@@ -152,20 +152,6 @@ class RealSensor:
             return False
         return MIN_RATIO * self.free.usual_distance < self.usual_distance
 
-    @cached_property
-    def is_mirrored(self) -> bool:
-        """Whether its axes are left-handed, as those of no sensor are, however mounted.
-
-        Each axis has to show clearly, or its direction would be one of noise.
-        """
-        if self.expected is None:
-            return False
-        inverse = np.linalg.pinv(self._design[0])
-        matrix = (inverse @ self.expected)[:3] / self.gravity
-        error = self.usual_distance / self.gravity * np.linalg.norm(inverse[:3], ord=2)
-        least = np.linalg.svd(matrix, compute_uv=False)[-1]
-        return bool(np.linalg.det(matrix) < 0 and least > MIN_RATIO * error)
-
 
 def attitude_forces(campaign: Campaign) -> Array:
     """Return what an ideal sensor reads at the robot's angles, (n, 3), m/s²."""

@@ -288,13 +288,10 @@ def _undo(
 
 
 def _is_clear(correction: Correction, before: RealSensor, after: RealSensor) -> bool:
-    """Whether a correction clearly improves what was clearly wrong; no sensor is mirrored."""
+    """Whether a correction clearly improves what was clearly wrong."""
     if correction.left_out or (not before.attitude and correction.name == "axis_error"):
         return True  # the hypothesis itself has compared
     if correction.changed is None:
-        turned_over = correction.matrix is not None and np.linalg.det(correction.matrix) < 0
-        if turned_over and before.free.is_mirrored:
-            return after.misfit < before.misfit
         # Single positions may be wrong as well: it is enough that most others fit then.
         gained = before.misfit > MIN_RATIO * after.misfit
         return bool(gained or before.usual_distance > MIN_RATIO * after.usual_distance)
@@ -407,37 +404,19 @@ def rows(sensor: RealSensor) -> Iterator[Correction]:
     wrong = np.flatnonzero(sensor.wrong | lost)
     if not 1 < len(wrong) <= MAX_EXCHANGED:
         return
+    from scipy import optimize  # slow to import, and seldom needed
+
     # Rows in the same attitude could be exchanged at will, so an exchange must gain something.
     least = min(MIN_RATIO * sensor.usual_distance, MIN_POSITION_ERROR * sensor.gravity)
     cost = campaign.forces[wrong][:, None] - sensor.expected[wrong][None]
     order = np.arange(campaign.n_positions)
-    order[wrong] = wrong[_places(np.linalg.norm(cost, axis=2), least)]
+    gain = np.sum(cost**2, axis=2) + least**2 * (1 - np.eye(len(wrong)))
+    order[wrong] = wrong[optimize.linear_sum_assignment(gain.T)[1]]
     moved = order != np.arange(len(order))
     if moved.any():
         positions = short_list([*map(str, campaign.positions[moved])])
         reason = f"the forces of positions {positions} are exchanged"
         yield Correction("row_order", reason, reorder_rows(campaign, order), changed=moved)
-
-
-def _places(cost: Array, least: float) -> NDArray[np.int_]:
-    """Return the row for each position, (s,): those that fit best, where they do so clearly.
-
-    Parameters
-    ----------
-    cost : (s, s) array, distance of each row (first index) from what each position should read
-    least : float, that an exchange must gain
-    """
-    stay = np.arange(len(cost))
-    total = cost**2 + least**2 * (1 - np.eye(len(cost)))
-    if np.array_equal(np.argmin(total, axis=1), stay):
-        return stay
-    from scipy import optimize, sparse  # slow to import, and seldom needed
-
-    places = optimize.linear_sum_assignment(total.T)[1]
-    exchanges = sparse.coo_array((np.ones(len(cost)), (stay, places)))
-    _, cycle = sparse.csgraph.connected_components(exchanges)
-    before, after = (np.bincount(cycle, cost[row, stay] ** 2) for row in (stay, places))
-    return np.where((before >= MIN_RATIO**2 * after)[cycle], places, stay)
 
 
 def outliers(sensor: RealSensor) -> Iterator[Correction]:
