@@ -6,7 +6,7 @@ Matplotlib is loaded where something is drawn, so that a file with a figure is i
 from __future__ import annotations
 
 import re
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from functools import cache
 from typing import TYPE_CHECKING, Any
 
@@ -246,9 +246,27 @@ def say_empty(ax: Axes, text: str = "no estimable cell") -> None:
             bbox={"facecolor": "white", "edgecolor": "none", "pad": 2})  # fmt: skip
 
 
-def ink_on(image: AxesImage, value: float) -> str:
-    """Colour of a text on the field of an image that shows `value`; see `inks_on`."""
-    return str(inks_on(image, [value])[0])
+def matrix(
+    ax: Axes,
+    rows: Sequence[str],
+    columns: Sequence[str],
+    values: NDArray[np.float64],
+    texts: NDArray[np.str_],
+    **colours: Any,
+) -> AxesImage:
+    """Draw a matrix as fields with texts; its rows and columns have titles.
+
+    Where a value is NaN there is no field.
+    """
+    ax.grid(False)
+    ax.tick_params(length=0)
+    ax.set_xticks(range(len(columns)), columns)
+    ax.set_yticks(range(len(rows)), rows)
+    image = ax.imshow(values, interpolation="none", **colours)
+    font: Style = {"ha": "center", "va": "center", "fontsize": 6.5, "in_layout": False}
+    for (i, j), ink in np.ndenumerate(inks_on(image, values)):
+        ax.text(j, i, str(texts[i, j]), color=ink, **font)
+    return image
 
 
 def inks_on(image: AxesImage, values: ArrayLike) -> NDArray[np.str_]:

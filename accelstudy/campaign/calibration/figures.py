@@ -8,7 +8,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from accelstudy.campaign.calibration.fit import CampaignFit
-from accelstudy.drawing.style import FULL, INK, approach_colour, ink_on, new_figure, symbol
+from accelstudy.drawing.style import FULL, INK, approach_colour, matrix, new_figure, symbol
 
 SUSPECT = "#D55E00"
 """Colour of a position in conflict with the others."""
@@ -50,15 +50,10 @@ def correlation_figure(fit: CampaignFit) -> Figure:
     correlation = fit.covariance / np.outer(sigma, sigma)
     names = [symbol(name) for name in fit.model.parameter_names]
     figure = new_figure(FULL * 0.6, 85)
-    ax = figure.add_subplot()
-    image = ax.imshow(correlation, cmap="RdBu_r", vmin=-1, vmax=1)
-    ax.set_xticks(range(len(names)), names)
-    ax.set_yticks(range(len(names)), names)
-    ax.grid(False)
-    for (i, j), value in np.ndenumerate(correlation):
-        if i != j and abs(value) >= 0.1:
-            text = f"{value:.1f}".replace("-", "−")
-            ax.text(j, i, text, ha="center", va="center", fontsize=6,
-                    color=ink_on(image, value))  # fmt: skip
+    texts = np.char.replace(np.char.mod("%.1f", correlation), "-", "−")
+    texts[np.eye(len(names), dtype=bool) | ~(np.abs(correlation) >= 0.1)] = ""
+    image = matrix(
+        figure.add_subplot(), names, names, correlation, texts, cmap="RdBu_r", vmin=-1, vmax=1
+    )
     figure.colorbar(image, label="correlation")
     return figure

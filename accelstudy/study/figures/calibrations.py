@@ -6,7 +6,7 @@ import numpy as np
 
 from accelstudy.drawing import style
 from accelstudy.study.config import APPROACHES
-from accelstudy.study.figures.panels import Image, handle, in_shown_units, matrix, panels, points
+from accelstudy.study.figures.panels import Image, handle, in_shown_units, panels, points
 from accelstudy.study.figures.registry import Axes, DataFrame, Figure, Study, Tables, register
 
 MIN_WRITTEN = 0.005
@@ -114,7 +114,7 @@ def correlations_of_parameters(tables: Tables, study: Study) -> Figure:
         texts = np.char.lstrip(np.char.mod("%.2f", values), "0")
         for lines in (ax.hlines, ax.vlines):  # between the groups of parameters
             lines(edges, -0.5, len(names) - 0.5, "#BBBBBB", linewidth=0.6)
-        return matrix(
+        return style.matrix(
             ax, symbols, symbols, values, np.where(values > MIN_WRITTEN, texts, ""), **look
         )
 

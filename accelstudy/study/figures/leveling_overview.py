@@ -8,7 +8,7 @@ from accelstudy.basics.units import GON, attitude_unit, shown_unit, to_attitude,
 from accelstudy.drawing import style
 from accelstudy.schemes import get_scheme
 from accelstudy.study.figures.factors import NOISES, varies
-from accelstudy.study.figures.panels import FAILED, Image, handle, matrix, panels, tilt_errors
+from accelstudy.study.figures.panels import FAILED, Image, handle, panels, tilt_errors
 from accelstudy.study.figures.registry import Axes, DataFrame, Figure, Study, Tables, register
 
 ROW_MM = 6.0
@@ -50,7 +50,9 @@ def leveling_overview(tables: Tables, study: Study) -> Figure:
         x, y = failed["model"].map(models.index), failed["scheme"].map(schemes.index)
         ax.plot(x, y, color="#999999", **FAILED)
         ax.tick_params(axis="x", rotation=90)
-        return matrix(ax, *titles, rms, np.vectorize(_texts)(rms, both), aspect="auto", **look)
+        return style.matrix(
+            ax, *titles, rms, np.vectorize(_texts)(rms, both), aspect="auto", **look
+        )
 
     unit, noise = shown_unit("rad"), f"{study.sigma_force * 1e3:.3g} mm/s²"
     largest = f"{to_attitude(study.leveling.max_tilt_gon * GON):g} {attitude_unit()}"

@@ -11,7 +11,7 @@ from collections.abc import Callable, Sequence
 from typing import TYPE_CHECKING, Any, TypeAlias
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from accelstudy.drawing import style
 from accelstudy.study.figures.registry import Axes, DataFrame, Figure, Tables
@@ -230,26 +230,3 @@ def surface(ax: Axes, x: ArrayLike, y: ArrayLike, values: ArrayLike, **limits: A
     """Draw values (y, x) as a smooth map."""
     ax.grid(False)
     return ax.pcolormesh(x, y, values, shading="gouraud", rasterized=True, **limits)
-
-
-def matrix(
-    ax: Axes,
-    rows: Sequence[str],
-    columns: Sequence[str],
-    values: NDArray[np.float64],
-    texts: NDArray[np.str_],
-    **colours: Any,
-) -> Image:
-    """Draw a matrix as fields with texts; its rows and columns have titles.
-
-    Where a value is NaN there is no field.
-    """
-    ax.grid(False)
-    ax.tick_params(length=0)
-    ax.set_xticks(range(len(columns)), columns)
-    ax.set_yticks(range(len(rows)), rows)
-    image = ax.imshow(values, interpolation="none", **colours)
-    font: style.Style = {"ha": "center", "va": "center", "fontsize": 6.5, "in_layout": False}
-    for (i, j), ink in np.ndenumerate(style.inks_on(image, values)):
-        ax.text(j, i, str(texts[i, j]), color=ink, **font)
-    return image
