@@ -17,11 +17,13 @@ from accelstudy.campaign.gross_errors.recognition import (
     SIGNED_PERMUTATIONS,
     recognise,
 )
+from accelstudy.campaign.header import LogLayout
 from accelstudy.campaign.session import Campaign
 from accelstudy.diagnosis.pipeline import diagnose
 from accelstudy.leveling.angles import angles_of
 from accelstudy.schemes import get_scheme
-from accelstudy.sensors.conversion import Conversion
+from accelstudy.sensors.conversion import Conversion, conversion_of
+from accelstudy.sensors.frames import parse_frame
 from accelstudy.sensors.models import get_model
 
 CLEAN = acs.simulate_campaign(n_samples=50, yaw="random")
@@ -132,7 +134,10 @@ COUNTS = {
 @pytest.mark.parametrize("columns", [(1, 0, 2), (2, 1, 0), (1, 2, 0)])
 def test_columns_of_counts_are_exchanged_before_their_scales_and_offsets(differ, columns, robot):
     """It ended in "does not converge", or in scales and biases that no sensor has."""
-    nominal = Conversion(*map(np.array, COUNTS[differ]))
+    scale, offset = map(np.array, COUNTS[differ])
+    frame = parse_frame("rfu" if robot else "frd")
+    signed = frame.signs * frame.to_frd_order(scale)
+    nominal = Conversion(signed, frame.to_frd_order(offset))
     ideal = -9.80665 * get_scheme("faces-edges-corners-26").directions
     noise = 0.002 * np.random.default_rng(36).standard_normal(ideal.shape)
     forces = ideal * [1.004, 0.997, 1.006] + [0.12, -0.08, 0.2] + noise
@@ -141,12 +146,15 @@ def test_columns_of_counts_are_exchanged_before_their_scales_and_offsets(differ,
         **{"name": "counts", "positions": np.arange(1, 27), "forces": nominal.to_si(counts)},
         **{"gravity": 9.80665, "sigma_force": 0.002, "unit": "counts", "nominal": nominal},
         **({"angles": angles_of(ideal), "sigma_angle": 5e-5} if robot else {}),
+        log=LogLayout(unit="counts", scale=[*scale], offset=[*offset], frame=frame.name),
     )
     found = recognise(read)
     assert re.match("axes are swapped: . is read as .*, in the counts, before", found.reason)
     np.testing.assert_allclose(found.corrected.forces, forces, atol=1e-12)
     # Readings in counts are converted, and then turned, as those of the campaign were.
-    again = found.corrected.nominal.to_si(counts) @ found.matrix.T
+    log, logged = found.corrected.log, counts[:, np.argsort(frame.order)]
+    again = frame.to_frd(conversion_of(log.unit, log.scale, log.offset).to_si(logged))
+    again = again @ found.matrix.T
     np.testing.assert_allclose(again, forces, atol=1e-12)
     fit = fit_campaign(found.corrected, get_model("bias-scale-nonorthogonality"))
     np.testing.assert_allclose(

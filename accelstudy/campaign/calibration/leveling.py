@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import csv
 import gzip
-import io
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -14,7 +13,6 @@ import numpy as np
 import pandas as pd
 import pyarrow as pa
 import pyarrow.compute as pc
-import pyarrow.csv as arrow_csv
 from numpy.typing import NDArray
 
 from accelstudy.basics import bounds
@@ -330,31 +328,35 @@ def _is_parquet(path: str | Path) -> bool:
 
 
 def _write_csv(path: Path, table: pa.Table) -> None:
-    """Write CSV, packed if the name ends in .gz; what is no number is an empty cell."""
-    columns = {name: _without_nan(table[name]) for name in table.column_names}
-    plain = all(pa.types.is_primitive(c.type) or _is_plain(c) for c in columns.values())
-    how = arrow_csv.WriteOptions(include_header=False, quoting_style="none" if plain else "needed")
-    header = io.StringIO()
-    csv.writer(header, lineterminator="\n").writerow(columns)
-    opened = gzip.open if path.suffix.lower() == ".gz" else open
-    with whole_file(path) as temporary, opened(temporary, "wb") as file:
-        file.write(header.getvalue().encode())
-        try:
-            arrow_csv.write_csv(pa.table(columns), file, how)
-        except pa.ArrowInvalid as error:
-            raise InputError(f"{path}: {one_line(error)} in a CSV file; write .parquet") from None
+    packed = path.suffix.lower() == ".gz"
+    with (
+        whole_file(path) as temporary,
+        (gzip.open if packed else open)(temporary, "wt", encoding="utf-8", newline="") as file,
+    ):
+        csv.writer(file, lineterminator="\n").writerow(table.column_names)
+        for first in range(0, len(table), ROWS):
+            file.write("".join(_lines(table.slice(first, ROWS))))
 
 
-def _without_nan(column: pa.ChunkedArray) -> pa.ChunkedArray:
-    return (
-        pc.if_else(pc.is_nan(column), None, column) if pa.types.is_floating(column.type) else column
-    )
+def _lines(table: pa.Table) -> list[str]:
+    """Lines of CSV, joined column by column, which is ten times as fast as row by row."""
+    cells = [_text(name, table[name]) for name in table.column_names]
+    lines = pc.binary_join_element_wise(*cells, ",", null_handling="replace", null_replacement="")
+    return pc.binary_join_element_wise(lines, "", "\n").to_pylist()
 
 
-def _is_plain(column: pa.ChunkedArray) -> bool:
-    """Whether a column has texts that need no quotes."""
-    special = '[",\r\n]'
-    return (
-        pa.types.is_string(column.type)
-        and not pc.any(pc.match_substring_regex(column, special)).as_py()
-    )
+def _text(name: str, column: pa.ChunkedArray) -> pa.ChunkedArray:
+    """Column as cells of CSV; null for empty cells and NaN."""
+    if pa.types.is_floating(column.type):
+        return pc.if_else(pc.is_nan(column), None, column).cast(pa.string())
+    try:
+        text = column.cast(pa.string())
+    except (pa.ArrowInvalid, pa.ArrowNotImplementedError):
+        raise InputError(
+            f"column {name!r} is {one_line(column.type)}, which no text holds; write .parquet"
+        ) from None
+    special = pc.match_substring_regex(text, '[",\r\n]')
+    if not pc.any(special).as_py():
+        return text
+    quoted = pc.binary_join_element_wise("", pc.replace_substring(text, '"', '""'), "", '"')
+    return pc.if_else(special, quoted, text)

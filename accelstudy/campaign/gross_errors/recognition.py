@@ -358,7 +358,11 @@ def _undone(campaign: Campaign, matrix: Array) -> Iterator[Correction]:
     if np.allclose(scaled, matrix) and np.array_equal(offset, nominal.offset):
         return
     moved = campaign.forces + (nominal.offset - offset) * nominal.scale
-    read = replace(campaign, forces=moved, nominal=Conversion(nominal.scale, offset))
+    log = campaign.log
+    if log is not None:
+        in_its_axes = offset[np.argsort(log.axes.order)].tolist()
+        log = log.model_copy(update={"offset": in_its_axes})
+    read = replace(campaign, forces=moved, nominal=Conversion(nominal.scale, offset), log=log)
     reason += ", in the counts, before `scale` and `offset`"
     yield Correction("axis_error", reason, permute_axes(read, scaled), scaled)
 
