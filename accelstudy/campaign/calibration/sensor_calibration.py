@@ -359,6 +359,7 @@ def sensor_of(given: Any, name: str = "calibration") -> SensorCalibration:
     sensor = getattr(given, "sensor", None)
     expected = "what `calibrate` or `read_calibration` returns, or a path"
     check_type(name, sensor, SensorCalibration, expected=expected)
+    assert isinstance(sensor, SensorCalibration)
     return sensor
 
 
