@@ -35,15 +35,14 @@ from accelstudy.verbs.sensors import batch as batch
 from accelstudy.verbs.sensors import compare as compare
 from accelstudy.verbs.sensors import history as history
 from accelstudy.verbs.sensors import lot as lot
+from accelstudy.verbs.studies import catalogue as catalogue
 from accelstudy.verbs.studies import cells as cells
 from accelstudy.verbs.studies import claims as claims
 from accelstudy.verbs.studies import config_schema as config_schema
 from accelstudy.verbs.studies import init as init
 from accelstudy.verbs.studies import list_effects as list_effects
 from accelstudy.verbs.studies import list_schemes as list_schemes
-from accelstudy.verbs.studies import models as models
 from accelstudy.verbs.studies import scheme as scheme
-from accelstudy.verbs.tables import catalogue as catalogue
 
 __all__: list[str]
 __version__: str

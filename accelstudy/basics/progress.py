@@ -1,4 +1,4 @@
-"""What a command reports while it works: lines and, for long work, bars on a terminal.
+"""What a command reports while it works: lines and, for long work, a line on a terminal that goes.
 
 A function reports by `track` and `stage`, wherever it stands. They show nothing unless a command
 asks for it by `feedback`, so that the package is silent when it is used from Python. `say` is
@@ -7,35 +7,38 @@ for commands themselves: it prints unless `feedback` is quiet.
 
 from __future__ import annotations
 
+import os
 import sys
 from collections.abc import Callable, Iterable, Iterator, Sized
-from contextlib import ExitStack, contextmanager
+from contextlib import contextmanager
 from contextvars import ContextVar
-from functools import partial
-from typing import TYPE_CHECKING, TypeVar
+from typing import TypeVar
 
 import click
 
 from accelstudy.basics.errors import OPTIONS, for_user, printable
 
-if TYPE_CHECKING:
-    from rich.progress import Progress
-
 Item = TypeVar("Item")
 _quiet: ContextVar[bool] = ContextVar("quiet", default=False)
 _wanted: ContextVar[bool] = ContextVar("wanted", default=False)
-_bars: ContextVar[Progress | None] = ContextVar("bars", default=None)
+CLEAR = "\r\x1b[2K"
+"""What clears the line of a terminal."""
 
 
 @contextmanager
 def feedback(quiet: bool = False) -> Iterator[None]:
     """Show within a ``with`` block what `track` and `stage` report; or be quiet, `say` included."""
-    tokens = _quiet.set(quiet), _wanted.set(not quiet and sys.stderr.isatty())
+    tokens = _quiet.set(quiet), _wanted.set(not quiet and _can_clear())
     try:
         yield
     finally:
         _quiet.reset(tokens[0])
         _wanted.reset(tokens[1])
+
+
+def _can_clear() -> bool:
+    """Whether standard error is a terminal that can take back a line."""
+    return sys.stderr.isatty() and os.environ.get("TERM") != "dumb"
 
 
 def say(text: str) -> None:
@@ -53,7 +56,7 @@ def show(text: str) -> None:
 
 
 def begin(text: str) -> None:
-    """Say on standard error that long work begins, where no bar can show it: it is no terminal."""
+    """Say on standard error that long work begins, where it is no terminal and shows no stages."""
     if OPTIONS.get() is not None and not _quiet.get() and not sys.stderr.isatty():
         click.echo(text, err=True)
 
@@ -73,7 +76,9 @@ def failure(what: str, error: Exception) -> str:
 
 @contextmanager
 def stage(what: str, total: float | None = None) -> Iterator[Callable[[float], None]]:
-    """Show `what` is being done within a ``with`` block; stages may lie within each other.
+    """Show `what` is being done within a ``with`` block, on a line that goes at its end.
+
+    Stages may lie within each other; the line is that of the inner one, as long as it lasts.
 
     Parameters
     ----------
@@ -85,11 +90,22 @@ def stage(what: str, total: float | None = None) -> Iterator[Callable[[float], N
     if not _wanted.get():
         yield lambda done: None
         return
-    with ExitStack() as stack:
-        bars = _bars.get() or stack.enter_context(_progress_bars())
-        task = bars.add_task(what, total=total)
-        stack.callback(bars.remove_task, task)
-        yield partial(bars.advance, task)
+    shares: list[int] = []
+    done = 0.0
+
+    def advance(part: float) -> None:
+        nonlocal done
+        done += part
+        share = int(100 * done / total) if total else 0
+        if share not in shares:  # a terminal is slow
+            shares.append(share)
+            click.echo(f"{CLEAR}{what}{f' {share} %' if total else ''}", nl=False, err=True)
+
+    advance(0)
+    try:
+        yield advance
+    finally:
+        click.echo(CLEAR, nl=False, err=True)
 
 
 def track(items: Iterable[Item], what: str, total: float | None = None) -> Iterator[Item]:
@@ -100,28 +116,3 @@ def track(items: Iterable[Item], what: str, total: float | None = None) -> Itera
         for item in items:
             yield item
             advance(1)
-
-
-@contextmanager
-def _progress_bars() -> Iterator[Progress]:
-    """Bars on standard error that vanish at the end; none on a terminal that cannot take back."""
-    from rich.console import Console
-    from rich.progress import BarColumn, Progress, SpinnerColumn, TextColumn, TimeElapsedColumn
-
-    console = Console(stderr=True)
-    with Progress(
-        SpinnerColumn(),
-        TextColumn("{task.description}"),
-        BarColumn(),
-        TimeElapsedColumn(),
-        console=console,
-        disable=not console.is_interactive,
-        transient=True,
-        redirect_stdout=False,
-        redirect_stderr=False,
-    ) as bars:
-        token = _bars.set(bars)
-        try:
-            yield bars
-        finally:
-            _bars.reset(token)

@@ -117,6 +117,12 @@ class Setting:
     smooth: bool = False
     none: float = math.nan
 
+    @property
+    def limits(self) -> str:
+        """Its limits in words; empty without any."""
+        ends = {"above": self.above, "below": self.below}
+        return " and ".join(f"{word} {end:g}" for word, end in ends.items() if math.isfinite(end))
+
 
 class WithSettings:
     """Something with a name and with settings, written as ``name`` or ``name(setting=number)``.
@@ -146,14 +152,12 @@ class WithSettings:
         for name, value in settings.items():
             if name not in takes:
                 raise UnknownNameError(f"setting of the {self.kind} {self.name!r}", name, takes)
-            above, below, none = takes[name].above, takes[name].below, takes[name].none
-            if value != none and not above < value < below:
-                bounds = [f"above {above:g}"] if above > -math.inf else []
-                bounds += [f"below {below:g}"] if below < math.inf else []
+            setting = takes[name]
+            if value != setting.none and not setting.above < value < setting.below:
                 raise InputError(
                     f"{self.kind} {self.name!r}: {name}={value:g} must be a number "
-                    + (" and ".join(bounds) or "that is finite")
-                    + ("" if math.isnan(none) else f", or {none:g}")
+                    + (setting.limits or "that is finite")
+                    + ("" if math.isnan(setting.none) else f", or {setting.none:g}")
                 )
         self.settings = {**{setting.name: setting.default for setting in self.takes}, **settings}
 

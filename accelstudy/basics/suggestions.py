@@ -71,4 +71,4 @@ def _line(*parts: str | Path) -> str:
     """A command; a path that begins with a dash is not to be taken for an option."""
     words = [f"./{p}" if isinstance(p, Path) and str(p).startswith("-") else str(p) for p in parts]
     options = [word for path in loaded_files() for word in ("--plugin", path)]
-    return shlex.join(["accelstudy", *options, *words])
+    return shlex.join(["accelstudy", *words, *options])

@@ -231,9 +231,9 @@ def parse_quantity(
     match = _QUANTITY.fullmatch(text)
     known = UNITS.get(unit, {unit: 1.0})
     if match is None or not (match[2] or bare or float(match[1]) == 0):
-        example = f"2{next(iter(known))}" if unit != "1" else "2"
         number = "a number" if bare else "a number with its unit"
-        raise InputError(f"expected {number}, as {example}, not {brief(text)}")
+        like = _ends(least, most) if unit == "1" else f", as 2{next(iter(known))}"
+        raise InputError(f"expected {number}{like}, not {brief(text)}")
     given = match[2] or (unit if bare else next(iter(known)))
     for spelling, plain in _SPELLINGS.items():
         given = given.replace(spelling, plain)
@@ -242,12 +242,18 @@ def parse_quantity(
         raise InputError(f"{brief(text)}: the unit must be one of {', '.join(known)}")
     value = float(match[1]) * known[given]
     if not least <= value <= most:
-        ends = [f"at least {least / known[given]:.6g}"] if least > -math.inf else []
-        ends += [f"at most {most / known[given]:.6g}"] if most < math.inf else []
-        raise InputError(f"{brief(text)}: must be {' and '.join(ends)} {given}")
+        ends = f"{_ends(least / known[given], most / known[given])} {given}".removesuffix(" 1")
+        raise InputError(f"{brief(text)}: must be{ends}")
     if math.isinf(value):
         raise InputError(f"{brief(text)}: must be a finite number")
     return value
+
+
+def _ends(least: float, most: float) -> str:
+    """Limits in words, after a space; empty without any."""
+    ends = {"at least": least, "at most": most}
+    words = (f" {word} {end:.6g}" for word, end in ends.items() if math.isfinite(end))
+    return " and".join(words)
 
 
 @dataclass(frozen=True)

@@ -97,7 +97,7 @@ class Batch(Result):
         Raises
         ------
         InputError
-            If two campaigns have the same name.
+            If two campaigns have the same name, or none can be calibrated.
         """
         self.name = plural(len(campaigns), "campaign")
         self.sources: dict[str, str] = {}
@@ -118,6 +118,9 @@ class Batch(Result):
                 self.calibrations[name] = Calibration(fit, source=Path(source))
             except InputError as error:
                 self.failed[name] = one_line(error).removeprefix(f"{name}: ")
+        if not self.calibrations:
+            name, reason = next(iter(self.failed.items()))
+            raise InputError(f"no campaign can be calibrated: {name}: {reason}")
 
     @cached_property
     def content(self) -> Mapping[str, Any]:

@@ -179,7 +179,7 @@ def write_campaign(campaign: Campaign, folder: str | Path, plausible: bool = Tru
             writer.writerow(columns)
             writer.writerows(zip(*columns.values(), strict=True))
         with whole_file(folder / HEADER) as temporary:
-            content = header.model_dump(mode="json", exclude_none=True)
+            content = header.model_dump(mode="json", exclude_none=True, by_alias=True)
             text = yaml.safe_dump(content, sort_keys=False, allow_unicode=True)
             temporary.write_text(text, encoding="utf-8")
     except OSError as error:

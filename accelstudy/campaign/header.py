@@ -10,6 +10,7 @@ import numpy as np
 from pydantic import (
     AfterValidator,
     BeforeValidator,
+    ConfigDict,
     Field,
     StrictInt,
     StrictStr,
@@ -34,6 +35,7 @@ from accelstudy.files.validation import (
     SigmaAngle,
     SigmaForce,
     SigmaGravity,
+    in_unit,
 )
 from accelstudy.sensors.conversion import Conversion, conversion_of
 from accelstudy.sensors.frames import Frame, parse_frame
@@ -129,6 +131,8 @@ class LogLayout(ConfigSection):
     Scale and offset are in the order of the log's own axes, whatever its frame.
     """
 
+    # `rate_hz` is the key of 0.1 to 0.3.
+    model_config = ConfigDict(populate_by_name=True)
     retired: ClassVar = {"delimiter": "it is told from the rows"}
 
     columns: dict[str, Place] = Field(
@@ -140,7 +144,9 @@ class LogLayout(ConfigSection):
     time_unit: Annotated[
         Literal["s", "ms", "us", "ns"], BeforeValidator(_usual_spelling(*CLOCK_UNITS))
     ] = Field("s", description="unit of that column")
-    rate_hz: Rate | None = Field(None, description="samples per second, without time")
+    rate_hz: Annotated[Rate | None, in_unit("Hz")] = Field(
+        None, alias="rate", description="samples per second, without time"
+    )
     variable: str | None = Field(
         None, description="which array of a MATLAB file, topic of a bag, or instance of a ULog"
     )

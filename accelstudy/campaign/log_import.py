@@ -19,7 +19,7 @@ from accelstudy.basics.wording import plural
 from accelstudy.campaign.importing.bags import BAG_OF_FOLDER
 from accelstudy.campaign.importing.log import Log, keys_of, log_of
 from accelstudy.campaign.importing.logs import import_log, write_imported
-from accelstudy.campaign.importing.public import import_settings, public_data, public_file
+from accelstudy.campaign.importing.public import import_settings, public_file
 from accelstudy.campaign.importing.settings import ImportSettings, parse_settings, read_settings
 from accelstudy.campaign.reference_log import ReferenceLog, open_reference
 from accelstudy.campaign.session import Campaign
@@ -60,14 +60,10 @@ class LogImport:
         return cls(*import_log(files, settings, reference), figure)
 
     @classmethod
-    def of_public(cls, name: str | None, folder: Path) -> LogImport | pd.DataFrame:
-        """Import public data, or list what there is."""
-        if name is not None:
-            settings = import_settings(name)
-            return cls(*import_log(public_file(name, folder), settings))
-        rows = ((k, one.description, one.licence, one.url) for k, one in public_data().items())
-        columns = ["name", "description", "licence", "url"]
-        return pd.DataFrame(rows, columns=columns).set_index("name")
+    def of_public(cls, name: str, folder: str | PathLike[str]) -> LogImport:
+        """Import public data."""
+        settings = import_settings(name)
+        return cls(*import_log(public_file(name, Path(folder)), settings))
 
     def write(self, folder: Path, place: Path) -> None:
         """Write the folder of the campaign, with its figure."""

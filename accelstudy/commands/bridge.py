@@ -10,8 +10,8 @@ from __future__ import annotations
 import inspect
 import os
 import re
-from collections.abc import Callable, Iterable, Iterator, Mapping
-from contextlib import AbstractContextManager, contextmanager
+from collections.abc import Callable, Iterable, Mapping
+from contextlib import AbstractContextManager, nullcontext
 from functools import cached_property
 from pathlib import Path
 from pkgutil import resolve_name
@@ -19,13 +19,12 @@ from typing import Any
 
 import click
 
-from accelstudy.basics.arguments import as_sequence
-from accelstudy.basics.errors import OPTIONS, InputError
+from accelstudy.basics.arguments import as_sequence, path_of
+from accelstudy.basics.errors import OPTIONS
 from accelstudy.basics.names import matches
-from accelstudy.basics.progress import feedback, stage
+from accelstudy.basics.progress import feedback
 from accelstudy.basics.units import ANGLE_UNIT_VARIABLE, angles_in
 from accelstudy.commands.listings import tell_value
-from accelstudy.files.outputs import OutputKind, result_folder
 from accelstudy.verbs import kinds
 from accelstudy.verbs.kinds import PATH, Names
 
@@ -41,19 +40,17 @@ def _load(ctx: click.Context, param: click.Parameter, paths: tuple[Path, ...]) -
         load_files(paths)
 
 
-PLUGIN: dict[str, Any] = {
-    "type": PATH,
-    "multiple": True,
-    "expose_value": False,
-    "callback": _load,
-    "help": "Python file with effects, schemes and the like of your own; it may also be named "
-    "after the command.",
-}
-"""The option of all commands, before their name and after it."""
-ANGLE_UNITS = Names("angle_unit", "accelstudy.basics.units", "ANGLE_UNITS")
+PLUGIN = click.Option(
+    ["--plugin"],
+    type=PATH,
+    multiple=True,
+    expose_value=False,
+    callback=_load,
+    help="Python file with effects, schemes and the like of your own.",
+)
 ANGLE_UNIT = click.Option(
     ["--angle-unit"],
-    type=ANGLE_UNITS,
+    type=Names("angle_unit", "accelstudy.basics.units:ANGLE_UNITS"),
     metavar="[gon|deg]",
     help=f"Unit in which angles are shown.  [default: gon, or {ANGLE_UNIT_VARIABLE}]",
 )
@@ -73,12 +70,9 @@ class Command(click.Command):
     run : function that does all of it, with the checked parameters of the verb, and all options
     make : function, or its place as "module:name", that works in place of the verb, with its
         checked parameters and further options
-    writes : Kind of the folder that --out names; of a result that is a file, a context manager as
-        `accelstudy.files.outputs.new_file`
+    writes : context manager as `accelstudy.files.outputs.new_file`, or its place as "module:name"
     out : str, help of --out
-    optional : bool, whether nothing is written without --out; or str, an argument without which
-        alone this is so
-    tell : function that prints what the verb returns, if that does not tell itself
+    optional : bool, whether nothing is written without --out
     options : further options, which come after that of --out
     sections : mapping of a title of the help to names of options, in the order of the help
     """
@@ -90,14 +84,13 @@ class Command(click.Command):
         *,
         run: Callable[..., None] | None = None,
         make: Callable[..., Any] | str = "",
-        writes: OutputKind | Place | None = None,
+        writes: Place | str | None = None,
         out: str = "Folder to write to.",
-        optional: bool | str = False,
-        tell: Callable[[Any], None] = tell_value,
+        optional: bool = False,
         options: Iterable[click.Option] = (),
         sections: Mapping[str, str] | None = None,
     ) -> None:
-        self.verb, self.writes, self.tell = verb, writes, tell
+        self.verb, self.writes = verb, writes
         self.run, self.make = run or self._save, make or inspect.unwrap(verb)
         self.sections = {title: names.split() for title, names in (sections or {}).items()}
         signature = inspect.signature(verb).parameters.values()
@@ -118,11 +111,9 @@ class Command(click.Command):
         keywords = kinds.keywords(self.verb)
         place = click.Option(["--out"], type=PATH, required=not optional, help=out)
         first, last = ([], []) if self.writes is None else ([place], [FORCE])
-        # It stands in the help of all commands together.
-        plugin = click.Option(["--plugin"], hidden=True, **PLUGIN)
         arguments = map(self._argument, self.arguments)
         of_verb = map(self._option, keywords.values())
-        return [*arguments, *first, *options, *of_verb, *last, ANGLE_UNIT, QUIET, plugin]
+        return [*arguments, *first, *options, *of_verb, *last, PLUGIN, ANGLE_UNIT, QUIET]
 
     def _argument(self, parameter: inspect.Parameter) -> click.Argument:
         """Argument of a positional parameter: a path or a name."""
@@ -163,8 +154,7 @@ class Command(click.Command):
 
     def parse_args(self, ctx: click.Context, args: list[str]) -> list[str]:
         """Read the options, by whose names messages call keywords from now on."""
-        options = (p for p in self.params if isinstance(p, click.Option))
-        OPTIONS.set({str(p.name): p.opts[0] for p in options})
+        OPTIONS.set({str(p.name): p.opts[0] for p in self.params if isinstance(p, click.Option)})
         try:
             return super().parse_args(ctx, args)
         except click.NoSuchOption as error:
@@ -172,40 +162,26 @@ class Command(click.Command):
             raise
 
     def _act(self, *, quiet: bool = False, angle_unit: str | None = None, **given: Any) -> None:
+        if given.get("out") is not None:
+            given["out"] = path_of("--out", given["out"])
         with feedback(quiet), angles_in(angle_unit):
             self.run(**kinds.check(self.verb, given))
 
     def _save(self, *, out: Path | None = None, **given: Any) -> None:
         """Write the result to --out, and print what it says."""
         force = self.writes is not None and given.pop("force")
-        optional = self._options[0]
-        if out is None and isinstance(optional, str) and given[optional] is not None:
-            raise InputError(f"--out: give the folder for {given[optional]}")
-        with self._place(out, force, given) as part:
-            make = resolve_name(self.make) if isinstance(self.make, str) else self.make
-            result = make(**given)
+        place: AbstractContextManager[Path | None] = nullcontext()
+        if out is not None:
+            place = _resolved(self.writes)(out, self._inputs(given), force)
+        with place as part:
+            result = _resolved(self.make)(**given)
             if status := getattr(result, "exit_status", 0):
                 result.tell(None)
                 raise click.exceptions.Exit(status)
             if part is not None:
                 result.write(part, out)
         tell = getattr(result, "tell", None)
-        tell(out) if tell else self.tell(result)
-
-    @contextmanager
-    def _place(
-        self, out: Path | None, force: bool, given: Mapping[str, Any]
-    ) -> Iterator[Path | None]:
-        """Where the result is written, apart from what is read; None if nothing is."""
-        writes, inputs = self.writes, self._inputs(given)
-        if writes is None or out is None:
-            yield None
-        elif isinstance(writes, OutputKind):
-            with result_folder(out, writes, inputs, force) as part, stage(writes.name):
-                yield part
-        else:
-            with writes(out, inputs, force) as part:
-                yield part
+        tell(out) if tell else tell_value(result)
 
     def _inputs(self, given: Mapping[str, Any]) -> list[Path]:
         """Files and folders that are read, of patterns, too."""
@@ -228,6 +204,11 @@ class Command(click.Command):
             if records:
                 with formatter.section(title):
                     formatter.write_dl(records)
+
+
+def _resolved(place: Any) -> Any:
+    """What stands at a place, if it is one as "module:name"."""
+    return resolve_name(place) if isinstance(place, str) else place
 
 
 def _metavar(parameter: inspect.Parameter) -> str:

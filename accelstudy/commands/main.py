@@ -5,7 +5,6 @@ The study itself is run by Snakemake.
 
 from __future__ import annotations
 
-from collections.abc import Iterable
 from contextlib import AbstractContextManager, nullcontext
 from pathlib import Path
 from typing import Any
@@ -13,13 +12,10 @@ from typing import Any
 import click
 
 from accelstudy.basics.errors import OPTIONS, InputError
-from accelstudy.basics.progress import stage, warn
-from accelstudy.basics.units import ANGLE_UNIT_VARIABLE, angles_in
-from accelstudy.commands import listings
-from accelstudy.commands.bridge import ANGLE_UNITS, PLUGIN, Command
+from accelstudy.commands.bridge import ANGLE_UNIT, PLUGIN, Command
 from accelstudy.commands.ending import bad_input_as_one_line, interruptible
 from accelstudy.files import outputs
-from accelstudy.files.outputs import new_file, result_folder
+from accelstudy.files.outputs import new_file
 from accelstudy.verbs import calibrations, campaigns, planning, retired, sensors, studies
 from accelstudy.verbs.kinds import PATH
 
@@ -34,8 +30,7 @@ def simulate_campaign(
     # The truth enters first and is moved last: it may be meant for a folder that is made here.
     with (
         nullcontext() if truth is None else new_file(truth, force=force) as truth_file,
-        result_folder(out, outputs.CAMPAIGN, force=force) as folder,
-        stage("simulation"),
+        outputs.CAMPAIGN.place(out, force=force) as folder,
     ):
         campaign = campaigns.simulate_campaign(name=name or out.resolve().name, **given)
         write_campaign(campaign, folder)
@@ -44,34 +39,11 @@ def simulate_campaign(
     click.echo(f"campaign: {out} ({campaign.n_positions} positions)")
 
 
-def exported(calibration: Path, form: str) -> str:
-    """Calibration in a form that a device takes, with a warning of what the form cannot hold."""
-    from accelstudy.campaign.calibration.export import export, losses
-    from accelstudy.campaign.calibration.sensor_calibration import sensor_of
-
-    sensor = sensor_of(calibration)
-    text = export(sensor, form)
-    if mended := sensor.content.get("mended"):
-        warn(f"the calibration is of mended data: {mended['reason']}")
-    for loss in losses(sensor, form):
-        warn(loss)
-    return text
-
-
-def new_table(
-    path: Path, inputs: Iterable[str | Path] = (), force: bool = False
-) -> AbstractContextManager[Path]:
+def new_table(path: Path, *how: Any) -> AbstractContextManager[Path]:
     """Return the place of a table, which is no spreadsheet; see `new_file`."""
     if path.suffix.lower() in (".xlsx", ".xls", ".ods"):
         raise InputError(f"{path}: a spreadsheet is not written; let it end in .csv or .parquet")
-    return new_file(path, inputs, force)
-
-
-def new_scheme(*place: Any, **how: Any) -> AbstractContextManager[Path]:
-    """Return the place of a scheme."""
-    from accelstudy.planning.design import new_scheme
-
-    return new_scheme(*place, **how)
+    return new_file(path, *how)
 
 
 SECTIONS = {
@@ -80,7 +52,7 @@ SECTIONS = {
             campaigns.find_holds,
             "import",
             make="accelstudy.campaign.log_import:LogImport.of",
-            writes=outputs.CAMPAIGN,
+            writes=outputs.CAMPAIGN.place,
             options=[
                 click.Option(
                     ["--figure/--no-figure"], default=True, help="Draw the log with its holds."
@@ -100,14 +72,12 @@ SECTIONS = {
         Command(
             campaigns.public,
             make="accelstudy.campaign.log_import:LogImport.of_public",
-            writes=outputs.CAMPAIGN,
-            optional="name",
-            tell=listings.tell_public,
+            writes=outputs.CAMPAIGN.place,
         ),
         Command(
             campaigns.simulate_campaign,
             run=simulate_campaign,
-            writes=outputs.CAMPAIGN,
+            writes=outputs.CAMPAIGN.place,
             options=[click.Option(["--truth"], type=PATH, help="YAML file for the truth.")],
             sections={
                 "What is written": "out truth name seed",
@@ -118,25 +88,25 @@ SECTIONS = {
             },
         ),
         Command(planning.advise),
-        Command(calibrations.calibrate, writes=outputs.CALIBRATION),
-        Command(calibrations.diagnose, writes=outputs.DIAGNOSIS),
-        Command(sensors.batch, writes=outputs.BATCH),
-        Command(sensors.lot, writes=outputs.LOT),
-        Command(calibrations.check_sigmas, tell=listings.tell_sigmas),
+        Command(calibrations.calibrate, writes=outputs.CALIBRATION.place),
+        Command(calibrations.diagnose, writes=outputs.DIAGNOSIS.place),
+        Command(sensors.batch, writes=outputs.BATCH.place),
+        Command(sensors.lot, writes=outputs.LOT.place),
+        Command(calibrations.check_sigmas),
         Command(
             calibrations.apply,
             make=calibrations.leveled,
             writes=new_table,
             out="CSV or Parquet file to write.",
         ),
-        Command(calibrations.export, make=exported),
-        Command(sensors.compare, writes=outputs.COMPARISON),
-        Command(sensors.history, writes=outputs.HISTORY),
+        Command(calibrations.export),
+        Command(sensors.compare, writes=outputs.COMPARISON.place),
+        Command(sensors.history, writes=outputs.HISTORY.place),
     ],
     "Before a calibration, and what it is worth": [
         Command(
             planning.plan,
-            writes=outputs.PLAN,
+            writes=outputs.PLAN.place,
             optional=True,
             sections={
                 "What is asked": "tilt_accuracy tilt_range sensor sigma history equipment "
@@ -149,14 +119,14 @@ SECTIONS = {
         Command(planning.data_sheet, writes=new_file, out="YAML file to write."),
     ],
     "What there is to choose from": [
-        Command(studies.models, tell=listings.tell_models),
-        Command(studies.list_effects, "effects", tell=listings.tell_effects),
+        Command(studies.catalogue),
+        Command(studies.list_effects, "effects"),
         Command(studies.list_schemes, "schemes"),
-        Command(studies.scheme, tell=listings.tell_directions),
+        Command(studies.scheme),
         Command(
             planning.find_positions,
             "design",
-            writes=new_scheme,
+            writes="accelstudy.planning.design:new_scheme",
             out="YAML file for the positions.",
             sections={
                 "The calibration": "model approach positions sigma robot_sigma gravity_sigma",
@@ -167,7 +137,7 @@ SECTIONS = {
     ],
     "Studies": [
         Command(studies.init),
-        Command(studies.cells, tell=listings.tell_cells),
+        Command(studies.cells),
         Command(studies.claims),
         Command(studies.config_schema),
     ],
@@ -177,10 +147,6 @@ SECTIONS = {
 
 class Commands(click.Group):
     """Commands in sections, that end bad input with one line and exit status 2."""
-
-    def list_commands(self, ctx: click.Context) -> list[str]:
-        """Names of all commands, in the order of use."""
-        return [str(command.name) for commands in SECTIONS.values() for command in commands]
 
     def format_commands(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
         """Write the sections of the help."""
@@ -199,6 +165,15 @@ class Commands(click.Group):
         finally:
             OPTIONS.reset(token)
 
+    def parse_args(self, ctx: click.Context, args: list[str]) -> list[str]:
+        """Read what stands before a command, of which earlier versions took more."""
+        try:
+            return super().parse_args(ctx, args)
+        except click.NoSuchOption as error:
+            if error.option_name in (*PLUGIN.opts, *ANGLE_UNIT.opts):
+                raise InputError(f"{error.option_name}: give it after the command") from None
+            raise
+
     def resolve_command(
         self, ctx: click.Context, args: list[str]
     ) -> tuple[str | None, click.Command | None, list[str]]:
@@ -215,19 +190,7 @@ class Commands(click.Group):
 
 @click.group(cls=Commands, commands=[c for commands in SECTIONS.values() for c in commands])
 @click.version_option(package_name="accelstudy")
-@click.option(
-    "--angle-unit",
-    metavar="[gon|deg]",
-    type=ANGLE_UNITS,
-    default="gon",
-    show_default=True,
-    envvar=ANGLE_UNIT_VARIABLE,
-    show_envvar=True,
-    help="Unit in which commands, pages and figures show angles, gon or deg.",
-)
-@click.option("--plugin", **PLUGIN)
-@click.pass_context
-def main(ctx: click.Context, angle_unit: str) -> None:
+def main() -> None:
     """Monte Carlo study of accelerometer calibration for leveling.
 
     Snakemake runs studies. These commands calibrate measured data, plan and judge calibrations, and
@@ -237,4 +200,3 @@ def main(ctx: click.Context, angle_unit: str) -> None:
     status is 0 with any verdict, a rejected calibration included, 1 if `plan` finds nothing that
     reaches the accuracy or the command was broken off, and 2 if an input or an option is wrong.
     """
-    ctx.with_resource(angles_in(angle_unit))

@@ -5,10 +5,9 @@ from __future__ import annotations
 import math
 from dataclasses import replace
 from pathlib import Path
-from typing import Annotated, Any, Literal
+from typing import Any
 
 import numpy as np
-from pydantic import BaseModel
 from scipy.optimize import nnls
 
 from accelstudy.basics.errors import InputError
@@ -19,10 +18,9 @@ from accelstudy.campaign.importing.settings import ImportSettings
 from accelstudy.data_sheets.sheet import FLICKER, DataSheet
 from accelstudy.effects import get_effect
 from accelstudy.epochs.course import YEAR
-from accelstudy.files.reading import read_json
-from accelstudy.files.validation import Finite, NotNegative, Number, validate
+from accelstudy.files.documents import Document, Part
+from accelstudy.files.validation import Finite, NotNegative
 
-NO_HISTORY = "not a history.json of accelstudy"
 MIN_VARIANCE_SHARE = 0.02
 """A kind of noise must make up this part of the Allan variance at some averaging time."""
 
@@ -105,7 +103,7 @@ def with_history(sheet: DataSheet, path: str | Path) -> DataSheet:
     InputError
         If it is no history, or none of a bias.
     """
-    document = validate(_Document, read_json(path, NO_HISTORY), f"{path}: {NO_HISTORY}")
+    document = _History.read(path)
     names = [parameter.name for parameter in get_effect("bias").parameters]
     biases = [parameter for parameter in document.parameters if parameter.name in names]
     if not biases:
@@ -121,23 +119,23 @@ def with_history(sheet: DataSheet, path: str | Path) -> DataSheet:
     )
 
 
-class _Rate(BaseModel):
+class _Rate(Part):
     per_year: Finite
     sigma: NotNegative
 
 
-class _Scatter(BaseModel):
+class _Scatter(Part):
     sd: NotNegative
 
 
-class _Parameter(BaseModel):
+class _Parameter(Part):
     name: str
     rate: _Rate
     scatter: _Scatter
 
 
-class _Document(BaseModel):
+class _History(Document):
     """The part of `history.json` that is read."""
 
-    schema_version: Annotated[Literal[1], Number]
+    file = "history.json"
     parameters: list[_Parameter]

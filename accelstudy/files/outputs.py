@@ -44,6 +44,38 @@ class OutputKind:
             files |= {p.relative_to(folder) for p in (folder / name).rglob("*") if p.is_file()}
         return files
 
+    @contextmanager
+    def place(
+        self, out: str | Path, inputs: Iterable[str | Path] = (), force: bool = False
+    ) -> Iterator[Path]:
+        """Yield a new folder to write to; its files are moved to `out` together if all went well.
+
+        Enter it before anything is computed, so that a folder that cannot be written is found at
+        once.
+
+        Parameters
+        ----------
+        out : path of the folder of results, made if it is not there
+        inputs : files and folders that are read; `out` must be apart from them
+        force : bool
+            Whether to write into a folder with other files. Files that have the name of one that is
+            written are replaced, the others stay.
+
+        Raises
+        ------
+        InputError
+            If `out` is, holds or lies in an input, holds what must not be overwritten, or cannot be
+            written. `out` is then unchanged.
+        """
+        out = Path(out)
+        with _reported(out):
+            _check_apart(out, inputs)
+            is_earlier_result = _check_folder(out, self, force)
+            with _staging(out, out, "new") as new:
+                new.mkdir()
+                yield new
+                _publish(new, out.resolve(), self, is_earlier_result)
+
 
 DIAGNOSIS = OutputKind(
     "diagnosis",
@@ -91,43 +123,10 @@ _WITH_MARKERS = (
 
 
 @contextmanager
-def result_folder(
-    out: str | Path, kind: OutputKind, inputs: Iterable[str | Path] = (), force: bool = False
-) -> Iterator[Path]:
-    """Yield a new folder to write to; its files are moved to `out` together if all went well.
-
-    Enter it before anything is computed, so that a folder that cannot be written is found at once.
-
-    Parameters
-    ----------
-    out : path of the folder of results, made if it is not there
-    kind : OutputKind of the results
-    inputs : files and folders that are read; `out` must be apart from them
-    force : bool
-        Whether to write into a folder with other files. Files that have the name of one that is
-        written are replaced, the others stay.
-
-    Raises
-    ------
-    InputError
-        If `out` is, holds or lies in an input, holds what must not be overwritten, or cannot be
-        written. `out` is then unchanged.
-    """
-    out = Path(out)
-    with _reported(out):
-        _check_apart(out, inputs)
-        is_earlier_result = _check_folder(out, kind, force)
-        with _staging(out, out, "new") as new:
-            new.mkdir()
-            yield new
-            _publish(new, out.resolve(), kind, is_earlier_result)
-
-
-@contextmanager
 def new_file(
     path: str | Path, inputs: Iterable[str | Path] = (), force: bool = False
 ) -> Iterator[Path]:
-    """Yield a temporary file, which is moved to `path` if all went well; see `result_folder`.
+    """Yield a temporary file, which is moved to `path` if all went well; see `OutputKind.place`.
 
     Raises
     ------

@@ -26,6 +26,7 @@ from accelstudy.basics.bounds import Range
 from accelstudy.basics.errors import InputError, brief
 from accelstudy.basics.names import check_path_name
 from accelstudy.basics.plugins import load_plugins
+from accelstudy.basics.units import parse_quantity
 
 
 def _no_truth_value(value: Any) -> Any:
@@ -54,6 +55,15 @@ def bounds_of(range_: Range) -> tuple[Any, ...]:
     ends = {"minimum": 0 if range_.zero else range_.least, "maximum": range_.most}
     finite = Field(json_schema_extra=dict(ends))
     return Number, AfterValidator(range_.check), finite
+
+
+def in_unit(unit: str) -> BeforeValidator:
+    """Take a text with a unit, as `8g`, for a number in the SI unit, as the command line does."""
+
+    def read(value: Any) -> Any:
+        return parse_quantity(value, unit, bare=True) if isinstance(value, str) else value
+
+    return BeforeValidator(read, json_schema_input_type=float | str)
 
 
 Gravity = Annotated[float, *bounds_of(bounds.GRAVITY)]

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any, ClassVar
 from accelstudy.basics.arguments import path_of
 from accelstudy.basics.progress import say, show
 from accelstudy.drawing.style import FULL, MM, STYLE
-from accelstudy.files.outputs import OutputKind, new_file, result_folder
+from accelstudy.files.outputs import OutputKind, new_file
 from accelstudy.pages.notebook import notebook_html
 
 if TYPE_CHECKING:
@@ -102,8 +102,7 @@ class Result(ABC):
             If the folder has such files, or cannot be written; nothing is written then.
         """
         place, kind = path_of("folder", folder), getattr(self, "kind", None)
-        opened = result_folder(place, kind, (), force) if kind else new_file(place, (), force)
-        with opened as part:
+        with (kind.place if kind else new_file)(place, (), force) as part:
             self.write(part, place)
 
     def summary(self) -> str:

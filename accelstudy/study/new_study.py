@@ -10,7 +10,7 @@ from pathlib import Path
 import yaml
 
 from accelstudy.basics.plugins import file_key
-from accelstudy.files.outputs import STUDY, result_folder
+from accelstudy.files.outputs import STUDY
 from accelstudy.files.shipped import shipped
 
 TEMPLATE = Path(__file__).with_name("template")
@@ -39,7 +39,7 @@ def new_study(folder: Path, force: bool = False) -> str:
         "config/config.yaml": "study.yaml",
         "README.md": "README.md",
     }
-    with result_folder(folder, STUDY, [], force=force) as new:
+    with STUDY.place(folder, force=force) as new:
         (new / "config").mkdir()
         for target, source in sources.items():
             text = (TEMPLATE / source).read_text(encoding="utf-8")

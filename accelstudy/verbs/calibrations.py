@@ -5,8 +5,9 @@ from __future__ import annotations
 from os import PathLike
 from typing import TYPE_CHECKING, Annotated, Any
 
+from accelstudy.basics.arguments import path_of
 from accelstudy.basics.bounds import SIGMA_READING, TIME, Range
-from accelstudy.basics.progress import stage
+from accelstudy.basics.progress import stage, warn
 from accelstudy.verbs import kinds
 from accelstudy.verbs.kinds import Quantity, si, verb
 
@@ -66,7 +67,6 @@ def read_calibration(path: str | PathLike[str]) -> Calibration:
     InputError
         If there is no such file, or it is not a calibration.
     """
-    from accelstudy.basics.arguments import path_of
     from accelstudy.campaign.calibration.result import Calibration
     from accelstudy.campaign.calibration.sensor_calibration import read_calibration as read
 
@@ -99,7 +99,7 @@ def check_sigmas(
     DataFrame
         A row per parameter, in the units that people read: parameter, unit, estimate, sigma (as the
         adjustment claims it), sd_empirical with its 95 % interval, bias, ratio (sigma over
-        sd_empirical) and n_converged. What such a check can find is said in ``attrs["finds"]``.
+        sd_empirical) and n_converged. What such a check can find is said in ``attrs["legend"]``.
 
     Examples
     --------
@@ -111,7 +111,8 @@ def check_sigmas(
 
     fit = fit_of(campaign, model, approach)
     table = check(fit, replicates, seed)
-    table.attrs["finds"] = what_a_check_finds(fit)
+    meaning = "sigma: as the adjustment claims it; ratio: sigma / sd_empirical."
+    table.attrs["legend"] = f"{meaning}\n{what_a_check_finds(fit)}"
     return table
 
 
@@ -220,9 +221,14 @@ def export(calibration: Calibration | str | PathLike[str], *, form: str = "c") -
         accelstudy export calibrated/calibration.json --form c
     """
     from accelstudy.campaign.calibration.export import export as text_of
+    from accelstudy.campaign.calibration.export import losses
     from accelstudy.campaign.calibration.sensor_calibration import sensor_of
 
-    return text_of(sensor_of(calibration), form)
+    sensor = sensor_of(calibration)
+    text = text_of(sensor, form)
+    for loss in losses(sensor, form):
+        warn(loss)
+    return text
 
 
 @verb

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from os import PathLike
-from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 from accelstudy.basics import bounds
+from accelstudy.basics.arguments import path_of
 from accelstudy.basics.bounds import Range
 from accelstudy.basics.units import GON, STANDARD_GRAVITY
 from accelstudy.verbs import kinds
@@ -167,34 +167,25 @@ def find_holds(
 
 
 @verb
-def public(
-    name: str | None = None, *, folder: kinds.File = "resources/public"
-) -> Campaign | pd.DataFrame:
-    """Make a campaign of public data, or list what there is.
+def public(name: str, *, folder: kinds.File = "resources/public") -> Campaign:
+    """Make a campaign of public data.
 
     A download is checked by its sha256.
 
     Parameters
     ----------
     name : str
-        Name of the data; without it they are listed.
+        Name of the data; `accelstudy catalogue public-data` lists them.
     folder : path
         Where the file is, in any subfolder, or is downloaded to.
 
-    Returns
-    -------
-    Campaign or DataFrame
-        The campaign or, without a name, a row per name: description, licence and url.
-
     Examples
     --------
-        accelstudy public
         accelstudy public xsens-mti --out xsens
     """
     from accelstudy.campaign.log_import import LogImport
 
-    found = LogImport.of_public(name, Path(folder))
-    return found.campaign if isinstance(found, LogImport) else found
+    return LogImport.of_public(name, folder).campaign
 
 
 @verb
@@ -208,7 +199,6 @@ def read_campaign(folder: str | PathLike[str], *, plausible: bool = True) -> Cam
         Whether data that cannot be right, as of wrong units, is refused; `diagnose` tells what is
         wrong with it, too.
     """
-    from accelstudy.basics.arguments import path_of
     from accelstudy.campaign.format import read_campaign as read_folder
 
     return read_folder(path_of("folder", folder), plausible=plausible)
@@ -233,11 +223,10 @@ def write_campaign(
     plausible : bool
         Whether data that cannot be right is refused, as by `read_campaign`.
     """
-    from accelstudy.basics.arguments import path_of
     from accelstudy.campaign.format import write_campaign as write_folder
-    from accelstudy.files.outputs import CAMPAIGN, result_folder
+    from accelstudy.files.outputs import CAMPAIGN
 
-    with result_folder(path_of("folder", folder), CAMPAIGN, force=force) as part:
+    with CAMPAIGN.place(path_of("folder", folder), force=force) as part:
         write_folder(campaign, part, plausible=plausible)
 
 

@@ -12,8 +12,8 @@ import re
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cache, wraps
-from importlib import import_module
 from os import PathLike
+from pkgutil import resolve_name
 from textwrap import fill
 from typing import TYPE_CHECKING, Annotated, Any, ParamSpec, TypeVar, get_args, get_origin
 
@@ -63,28 +63,27 @@ class Names(Kind):
     Parameters
     ----------
     name : str, what is named
-    module, names : str, where the names are: a collection, or a function that returns one
+    place : str, "module:name" of the names: a collection, or a function that returns one
     files : bool, whether a file may stand for a name
     parts : Names, optional, what may be joined to a name by +
     """
 
     def __init__(
-        self, name: str, module: str, names: str, files: bool = False, parts: Names | None = None
+        self, name: str, place: str, files: bool = False, parts: Names | None = None
     ) -> None:
         super().__init__(self._read, name=name, files=files)
-        self.place, self.parts = (module, names), parts
+        self.place, self.parts = place, parts
 
     def _read(self, name: str, value: Any) -> str:
         """Name, or path of a file as text."""
         article, what = "an" if self.name[0] in "aeiou" else "a", self.name.replace("_", " ")
-        value = str(value) if self.files and isinstance(value, PathLike) else value
-        check_type(name, value, str, expected=f"the name of {article} {what}")
+        paths = (PathLike,) if self.files else ()
+        check_type(name, value, str, *paths, expected=f"the name of {article} {what}")
         return str(value)
 
     def known_names(self) -> Iterable[str]:
         """Names that there are."""
-        module, names = self.place
-        known = getattr(import_module(module), names)
+        known = resolve_name(self.place)
         return known() if callable(known) else known
 
     def shell_complete(
@@ -95,14 +94,6 @@ class Names(Kind):
         known = [*self.known_names(), *(self.parts.known_names() if plus and self.parts else ())]
         items = [CompletionItem(f"{before}{plus}{one}") for one in known if one.startswith(last)]
         return items or super().shell_complete(ctx, param, incomplete)
-
-
-class FilePath(Kind):
-    """A path that a file can have; a command makes one of any text."""
-
-    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Any:
-        """Return the path."""
-        return path_of("path", value)
 
 
 def kind_of_annotation(said: Any) -> Kind:
@@ -125,19 +116,11 @@ def kind_of_types(expected: str, *types: type, name: str = "text") -> Kind:
     return Kind(read, name)
 
 
-def _share(name: str, value: Any) -> float | None:
-    check_type(name, value, int, float, str, expected="a probability, as 0.95 or 95%")
-    text = str(value).strip()
+def _share_or_rms(name: str, value: Any) -> float | None:
     try:
-        share = float(text.removesuffix("%")) / (100 if text.endswith("%") else 1)
-    except ValueError:
-        share = math.nan
-    if text != "rms" and not 0.5 <= share <= 0.999:
-        raise InputError(
-            f"{key('confidence')}: must be rms, or a share from 50% to 99.9% of the calibrations, "
-            f"not {text!r}"
-        )
-    return None if text == "rms" else share
+        return None if value == "rms" else quantity(name, value, SHARE)
+    except InputError as error:
+        raise InputError(f"{error}; or rms") from None
 
 
 def numbers(example: str, separator: str = ",", count: int = 0) -> Kind:
@@ -186,22 +169,23 @@ Quantity = float | str
 TEXT = kind_of_types("a text", str)
 FLAG = kind_of_types("True or False", bool)
 COLUMN = kind_of_types("the name of a column or its number", str, int, name="column")
-PATH = FilePath(path_of, "path", files=True)
-SHARE_OR_RMS = Kind(_share, "share")
+PATH = Kind(path_of, "path", files=True)
+SHARE = si("1", 0.5, 0.999)
+SHARE_OR_RMS = Kind(_share_or_rms, "share")
 GRAVITY = si("m/s^2", bounds.GRAVITY.least, bounds.GRAVITY.most)
 File = Annotated[str | PathLike[str], PATH]
 Accuracy = Annotated[Quantity, angle(1e-9, math.pi / 2)]
 Tilt = Annotated[Quantity, angle(1e-3, math.pi / 2)]
-Share = Annotated[Quantity, si("1", 0.5, 0.999)]
+Share = Annotated[Quantity, SHARE]
 
-EFFECTS = Names("effect", "accelstudy.effects", "effect_names")
-APPROACHES = Names("approach", "accelstudy.approaches", "approach_names")
+EFFECTS = Names("effect", "accelstudy.effects:effect_names")
+APPROACHES = Names("approach", "accelstudy.approaches:approach_names")
 EffectName = Annotated[str, EFFECTS]
 NoiseEffectName = Annotated[
-    str, Names("noise_effect", "accelstudy.noise_effects", "noise_effect_names")
+    str, Names("noise_effect", "accelstudy.noise_effects:noise_effect_names")
 ]
-SchemeName = Annotated[str, Names("scheme", "accelstudy.schemes", "scheme_names", True)]
-SensorName = Annotated[str, Names("sensor", "accelstudy.data_sheets", "data_sheet_names", True)]
+SchemeName = Annotated[str, Names("scheme", "accelstudy.schemes:scheme_names", True)]
+SensorName = Annotated[str, Names("sensor", "accelstudy.data_sheets:data_sheet_names", True)]
 _BY = "Calibrate by gravity alone, or with the angles of a robot, too."
 ApproachName = Annotated[str, APPROACHES, _BY]
 UsualApproach = Annotated[
@@ -209,8 +193,8 @@ UsualApproach = Annotated[
 ]
 ModelName = Annotated[
     str,
-    Names("model", "accelstudy.sensors.models", "MODELS", True, EFFECTS),
-    "A model: one that `accelstudy models` lists, a composition, or a YAML file.",
+    Names("model", "accelstudy.sensors.models:MODELS", True, EFFECTS),
+    "A model: one that `accelstudy catalogue models` lists, a composition, or a YAML file.",
 ]
 TypeFile = Annotated[
     str | PathLike[str] | None,
@@ -386,11 +370,10 @@ def _documented(function: Callable[..., Any]) -> str:
 
 def check(function: Callable[..., Any], given: Mapping[str, Any]) -> dict[str, Any]:
     """Check keywords as a verb does; those that are not given have their defaults."""
-    values = {name: given.get(name, one.default) for name, one in keywords(function).items()}
     return {**given} | {
-        name: one.check(values[name])
+        name: one.check(value)
         for name, one in keywords(function).items()
-        if values[name] is not inspect.Parameter.empty
+        if (value := given.get(name, one.default)) is not inspect.Parameter.empty
     }
 
 

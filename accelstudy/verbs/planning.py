@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Annotated
 from accelstudy.basics import bounds
 from accelstudy.basics.arguments import path_of
 from accelstudy.basics.bounds import Range
+from accelstudy.basics.progress import stage
 from accelstudy.basics.units import GON, STANDARD_GRAVITY, InputQuantity
 from accelstudy.planning.quantities import MOST_POSITIONS, QUANTITIES, REPLICATES
 from accelstudy.verbs import kinds
@@ -113,9 +114,7 @@ def find_positions(
     criterion: str = "I",
     tilt_range: Annotated[Quantity, angle(GON / 10, 100 * GON)] = "50gon",
     after: kinds.SchemeName | None = None,
-    attitudes: Annotated[
-        str, Names("attitudes", "accelstudy.design.spaces", "SPACES", True)
-    ] = "all",
+    attitudes: Annotated[str, Names("attitudes", "accelstudy.design.spaces:SPACES", True)] = "all",
     roll: tuple[HalfTurn, HalfTurn] | None = None,
     pitch: tuple[QuarterTurn, QuarterTurn] | None = None,
     pole_distance: Annotated[Quantity, angle(0.0, 100 * GON)] | None = None,
@@ -183,7 +182,7 @@ def advise(
     model: kinds.ModelName = "bias-scale-nonorthogonality",
     prior: kinds.TypeFile = None,
     attitudes: Annotated[
-        str | None, Names("attitudes", "accelstudy.sequential.choice", "SETS", True)
+        str | None, Names("attitudes", "accelstudy.sequential.choice:SETS", True)
     ] = None,
     pole_distance: Annotated[Quantity, angle(0.0, 2.0)] | None = None,
     max_roll: Annotated[Quantity, angle(0.0, 4.0)] | None = None,
@@ -314,7 +313,6 @@ def data_sheet(
         accelstudy data-sheet log.csv --rate 100 --columns fx=0,fy=1,fz=2 --out my-sensor.yaml
     """
     given = {**locals()}
-    from accelstudy.basics.progress import stage
     from accelstudy.campaign.log_import import settings_of
     from accelstudy.data_sheets.measured import sheet_of_campaign, sheet_of_log
 

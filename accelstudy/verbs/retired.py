@@ -1,7 +1,8 @@
 """What takes the place of commands and keywords of earlier versions."""
 
 COMMANDS = {
-    "pole": "the tutorial 'The foot of a pole' (examples/pole) works it out with a calibration"
+    "models": "`accelstudy catalogue models` lists them",
+    "pole": "the tutorial 'The foot of a pole' (examples/pole) works it out with a calibration",
 }
 NO_DELIMITER = {"delimiter": "it is told from the rows"}
 KEYWORDS = {
@@ -37,9 +38,7 @@ KEYWORDS = {
     },
     "simulate": {"robot_accuracy": "`robot_sigma` takes it"},
     "simulate_campaign": {
-        **dict.fromkeys(
-            ("gross", "gross_error", "gross_errors"), "change the rows of positions.csv"
-        ),
+        "gross": "change the rows of positions.csv",
         "hold": "campaigns have no slopes within holds",
         "no_time": "`interval` is none then",
         "robot_sigma_mgon": "`robot_sigma` takes it with its unit, as 5mgon",

@@ -7,11 +7,12 @@ from collections.abc import Sequence
 from datetime import datetime
 from os import PathLike
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Any
 
 from accelstudy.basics.arguments import as_sequence, check_once
 from accelstudy.basics.bounds import Range
 from accelstudy.basics.errors import InputError
+from accelstudy.basics.names import matches
 from accelstudy.verbs import kinds
 from accelstudy.verbs.kinds import verb
 
@@ -55,8 +56,8 @@ def compare(
     from accelstudy.campaign.calibration.sensor_calibration import sensor_of
     from accelstudy.epochs.results import Comparison
 
-    pair = sensor_of(first, "first"), sensor_of(second, "second")
-    return Comparison(*pair, float(tilt_range))  # in SI by `verb`
+    # The range is in SI by `verb`.
+    return Comparison(sensor_of(first, "first"), sensor_of(second, "second"), float(tilt_range))
 
 
 @verb
@@ -110,14 +111,11 @@ def history(
     calibrations = as_sequence(calibrations)
     check_once(calibrations, "calibration")
     sensors = [sensor_of(one) for one in calibrations]
-    names = [
-        str(one) if isinstance(one, str | PathLike) else f"calibration {i}"
-        for i, one in enumerate(calibrations, start=1)
-    ]
+    dated = dates_of(sensors, dates, [*map(str, calibrations)])
     wanted = None
     if tilt_accuracy is not None:
         wanted = float(tilt_accuracy), float(tilt_range), float(confidence)  # in SI by `verb`
-    return History(sensors, dates_of(sensors, dates, names), wanted)
+    return History(sensors, dated, wanted)
 
 
 @verb
@@ -158,7 +156,7 @@ def lot(
     from accelstudy.lots.output import Lot
     from accelstudy.verbs.inputs import as_campaign, chosen
 
-    given = [folder for one in as_sequence(campaigns) for folder in folders_of(one)]
+    given = folders_of(campaigns)
     check_once(given, "sensor")
     measured = [as_campaign(one) for one in given]
     return Lot.of(measured, *chosen(model, approach), seed, cores)
@@ -186,7 +184,7 @@ def batch(
     Raises
     ------
     InputError
-        If two campaigns have the same name, or a name is unknown.
+        If two campaigns have the same name, none can be calibrated, or a name is unknown.
 
     Examples
     --------
@@ -195,17 +193,15 @@ def batch(
     from accelstudy.campaign.batch import Batch
     from accelstudy.verbs.inputs import chosen
 
-    given = [folder for one in as_sequence(campaigns) for folder in folders_of(one)]
-    check_once(given, "campaign")
-    return Batch(given, *chosen(model, approach))
+    return Batch(folders_of(campaigns), *chosen(model, approach))
 
 
-def folders_of(given: Campaign | str | PathLike[str]) -> list[Campaign | str | PathLike[str]]:
-    """Folders that match a pattern; anything else stands for itself."""
-    from accelstudy.basics.names import matches
-
-    path = Path(given) if isinstance(given, str | PathLike) else None
-    found = None if path is None else matches(path, os.path.isdir)
-    if found == []:
-        raise InputError(f"{given}: no folder has such a name")
-    return [given] if found is None else [*map(Path, found)]
+def folders_of(campaigns: Any) -> list[Any]:
+    """Folders in place of the patterns that they match; anything else stands for itself."""
+    given: list[Any] = []
+    for one in as_sequence(campaigns):
+        found = matches(Path(one), os.path.isdir) if isinstance(one, str | PathLike) else None
+        if found == []:
+            raise InputError(f"{one}: no folder has such a name")
+        given += [one] if found is None else map(Path, found)
+    return given

@@ -5,34 +5,42 @@ from __future__ import annotations
 from collections.abc import Sequence
 from os import PathLike
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
 from accelstudy.verbs import kinds
-from accelstudy.verbs.kinds import verb
+from accelstudy.verbs.kinds import Names, verb
 
 if TYPE_CHECKING:
     import pandas as pd
 
 
-@verb
-def models() -> pd.DataFrame:
-    """List sensor models, and the presets of Table 1.
+CatalogueName = Annotated[str, Names("catalogue", "accelstudy.verbs.tables:KINDS")]
 
-    Commands take compositions, too: models and effects joined by +, as in
-    bias-scale+warm_up(tau=300).
+
+@verb
+def catalogue(kind: CatalogueName) -> pd.DataFrame:
+    """List effects, models, schemes, approaches and the like.
+
+    Sizes of effects are in the units that people read, settings and data sheets in SI. A model is
+    also any composition of models and effects joined by +, as bias-scale+warm_up(tau=300).
+
+    Parameters
+    ----------
+    kind : str
+        What is listed: effects, models, schemes, approaches, data-sheets or public-data.
 
     Returns
     -------
     DataFrame
-        A row per model, by its name: n_parameters and parameters.
+        A row per item, by its name.
 
     Examples
     --------
-        accelstudy models
+        accelstudy catalogue models
     """
-    from accelstudy.verbs.tables import catalogue
+    from accelstudy.verbs.tables import rows_of
 
-    return catalogue("models")
+    return rows_of(kind)
 
 
 @verb
@@ -70,7 +78,7 @@ def list_effects(
     from accelstudy.verbs import tables
 
     if campaign is None and scheme is None:
-        return tables.catalogue("effects")
+        return tables.rows_of("effects")
     return tables.visible_effects(campaign, scheme, model, approach)
 
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from os import PathLike
 from pathlib import Path
 from typing import Any
@@ -12,12 +12,12 @@ import numpy as np
 import pandas as pd
 
 from accelstudy.approaches import approach_names, get_approach
+from accelstudy.basics import units
 from accelstudy.basics.arguments import as_sequence
 from accelstudy.basics.errors import InputError, UnknownNameError
 from accelstudy.basics.plugins import source_of
 from accelstudy.basics.progress import stage, track
-from accelstudy.basics.registry import WithSettings
-from accelstudy.basics.units import angle_note, attitude_unit, to_attitude
+from accelstudy.campaign.importing.public import public_data
 from accelstudy.data_sheets.reading import data_sheet_names, get_data_sheet
 from accelstudy.data_sheets.sheet import QUANTITIES
 from accelstudy.design.estimability import estimability
@@ -35,58 +35,45 @@ from accelstudy.verbs.inputs import resolve
 Row = dict[str, object]
 
 
-def catalogue(kind: str) -> pd.DataFrame:
-    """Return all of a kind as a table, by name; numbers are in SI.
-
-    Parameters
-    ----------
-    kind : str
-        "effects", "noise effects", "models", "schemes", "approaches" or
-        "data sheets".
-    """
-    if kind not in KINDS:
+def rows_of(kind: str) -> pd.DataFrame:
+    """Return a catalogue by its name, in which - may be a space."""
+    make = KINDS.get(kind.replace(" ", "-"))
+    if make is None:
         raise UnknownNameError("catalogue", kind, KINDS)
-    return pd.DataFrame([*KINDS[kind]()]).set_index("name")
+    return pd.DataFrame(make()).set_index("name")
 
 
-def _effect(effect: Effect) -> Row:
-    columns = compose(effect.spec, (effect.spec,)).hold_columns
-    return {
-        **_item(effect, effect.equation),
-        "part": effect.part,
-        "family": effect.family,
-        "parameters": ", ".join(parameter.name for parameter in effect.parameters),
-        "unit": effect.parameters[0].unit,
-        "typical_low": effect.typical[0],
-        "typical_high": effect.typical[1],
-        "needs": " and the ".join(column for column in columns if column in PROVIDES),
-    }
-
-
-def _noise_effect(effect: NoiseEffect) -> Row:
-    setting = effect.takes[0]
-    return {
-        **_item(effect, effect.equation),
-        "setting": setting.name,
-        "unit": setting.unit,
-        "typical_low": effect.typical[0],
-        "typical_high": effect.typical[1],
-    }
-
-
-def _item(item: WithSettings, equation: str) -> Row:
-    """Columns of what has settings: its formula, and the settings as specs have them."""
+def _effect(item: Effect | NoiseEffect) -> Row:
+    """Row of an effect of the sensor or of the rig, or of a noise effect."""
+    row: Row = {"name": item.name, "equation": item.equation, "summary": item.summary}
     settings = [
-        f"{one.name}={plain_number(value)}{'' if one.unit == '1' else f' {one.unit}'}"
+        f"{one.name}={plain_number(value)} {_unit(one.unit)}".rstrip()
+        + (f" ({one.limits})" if one.limits else "")
         for one, value in zip(item.takes, item.settings.values(), strict=True)
     ]
-    return {
-        "name": item.name,
-        "equation": equation,
-        "summary": item.summary,
-        "plugin": source_of(item.kind, item.name) or "",
-        "settings": ", ".join(settings),
-    }
+    if isinstance(item, Effect):
+        columns = compose(item.spec, (item.spec,)).hold_columns
+        unit, ends = item.parameters[0].unit, item.typical
+        row |= {
+            "part": item.part,
+            "parameters": ", ".join(parameter.name for parameter in item.parameters),
+            "typical": f"{_ends(units.to_display(ends, unit))} {units.shown_unit(unit)}",
+            "needs": ", ".join(column for column in columns if column in PROVIDES),
+            "family": item.family,
+        }
+    else:
+        setting = item.takes[0]
+        typical = f"{setting.name} {_ends(item.typical)} {_unit(setting.unit)}"
+        row |= {"part": "noise", "typical": typical.rstrip()}
+    return row | {"settings": "; ".join(settings), "plugin": source_of(item.kind, item.name)}
+
+
+def _ends(ends: Iterable[float]) -> str:
+    return " … ".join(map(plain_number, ends))
+
+
+def _unit(unit: str) -> str:
+    return "" if unit == "1" else units.unit_label(unit)
 
 
 def plain_number(value: float) -> str:
@@ -95,20 +82,29 @@ def plain_number(value: float) -> str:
 
 
 KINDS: dict[str, Callable[[], list[Row]]] = {
-    "effects": lambda: [_effect(get_effect(name)) for name in effect_names()],
-    "noise effects": lambda: [_noise_effect(get_noise_effect(n)) for n in noise_effect_names()],
+    "effects": lambda: [
+        *map(_effect, sorted(map(get_effect, effect_names()), key=lambda one: one.part == "rig")),
+        *map(_effect, map(get_noise_effect, noise_effect_names())),
+    ],
     "models": lambda: [
-        {"name": name, "n_parameters": m.n_parameters, "parameters": ", ".join(m.parameter_names)}
+        {"name": name, "parameters": ", ".join(m.parameter_names), "n_parameters": m.n_parameters}
         for name, m in ((name, get_model(name)) for name in MODELS)
     ],
     "schemes": lambda: [
         {"name": scheme.name, "n_positions": scheme.n_positions, "status": scheme.status}
         for scheme in map(get_scheme, scheme_names())
     ],
-    "approaches": lambda: [{"name": name} for name in approach_names()],
-    "data sheets": lambda: [
+    "approaches": lambda: [
+        {"name": one.name, "n_conditions": one.n_conditions}
+        for one in map(get_approach, approach_names())
+    ],
+    "data-sheets": lambda: [
         {"name": sheet.name, "title": sheet.title, **{q: getattr(sheet, q) for q in QUANTITIES}}
         for sheet in map(get_data_sheet, data_sheet_names())
+    ],
+    "public-data": lambda: [
+        {"name": k, "description": one.description, "licence": one.licence, "url": one.url}
+        for k, one in public_data().items()
     ],
 }
 """Rows of each catalogue."""
@@ -135,7 +131,7 @@ def visible_effects(
         "\nMIB: size at which the effect can also be told from the one it is most like;"
         "\nwith: setting in which the effect shows best, of those that a diagnosis tries;"
         "\nconfused with: the nearest effects and the cosine of their signatures, 1 for the same."
-        f"\n{angle_note()}."
+        f"\n{units.angle_note()}."
     )
     return table
 
@@ -144,7 +140,7 @@ def scheme_table(names: Sequence[str], model: str, approach: str) -> pd.DataFram
     """Return what schemes, by default all, determine of the ideal sensor."""
     chosen_model, chosen_approach = get_model(model), get_approach(approach)
     check_needs_no_plan(chosen_model)
-    rows, pole = [], f"pole/{attitude_unit()}"
+    rows, pole = [], f"pole/{units.attitude_unit()}"
     for scheme in map(get_scheme, track(as_sequence(names) or scheme_names(), "schemes")):
         found = estimability(scheme, chosen_model, chosen_approach, blur=Noise().sigma_force)
         rows.append(
@@ -156,18 +152,17 @@ def scheme_table(names: Sequence[str], model: str, approach: str) -> pd.DataFram
                 "condition": found.condition if found.estimable else math.nan,
                 "r": found.redundancy,
                 "m": scheme.fourth_moment,
-                pole: float(to_attitude(scheme.pole_distance)),
+                pole: float(units.to_attitude(scheme.pole_distance)),
                 "not estimable": ", ".join(found.not_estimable),
             }
         )
-    table = pd.DataFrame(rows)
-    table.attrs["decimals"] = {"condition": 1, "m": 4, pole: 1}
+    table = pd.DataFrame(rows).round({"condition": 1, "m": 4, pole: 1})
     table.attrs["title"] = f"model {chosen_model.name}, approach {approach}"
     table.attrs["legend"] = (
         "rank and condition: of the scaled design matrix at the ideal sensor;"
         "\nr: conditions - unknowns; m: mean of x²y²;"
         "\npole: distance to the x axis, where roll is undefined;"
-        f"\n{angle_note()}."
+        f"\n{units.angle_note()}."
         f"\nFamilies: {', '.join(scheme_families())}."
     )
     return table
@@ -176,8 +171,8 @@ def scheme_table(names: Sequence[str], model: str, approach: str) -> pd.DataFram
 def directions(name: str) -> pd.DataFrame:
     """Return the directions of a scheme, with roll and pitch in the unit of angles."""
     scheme = get_scheme(name)
-    attitudes = to_attitude(angles_of(-scheme.directions))
-    columns = ["x", "y", "z", *(f"{angle}_{attitude_unit()}" for angle in ("roll", "pitch"))]
+    attitudes = units.to_attitude(angles_of(-scheme.directions))
+    columns = ["x", "y", "z", *(f"{angle}_{units.attitude_unit()}" for angle in ("roll", "pitch"))]
     table = pd.DataFrame(np.hstack([scheme.directions, attitudes]), columns=columns)
     table.attrs["title"] = f"{scheme.title} ({scheme.status}): {scheme.source}"
     return table.rename_axis("position")
@@ -192,4 +187,7 @@ def cell_table(configurations: Sequence[str | PathLike[str]]) -> pd.DataFrame:
         )
         rows.append((cell.name, found.redundancy, cell.replicates, found.reason or ""))
     columns = ["cell", "redundancy", "replicates", "reason"]
-    return pd.DataFrame(rows, columns=columns).set_index("cell")
+    table = pd.DataFrame(rows, columns=columns).set_index("cell")
+    effort = f"{len(table)} cells, up to {table['replicates'].sum()} calibrations"
+    table.attrs["legend"] = effort
+    return table

@@ -6,23 +6,17 @@ from importlib import import_module
 
 import griffe
 
-SECTIONS = ("Parameters", "Attributes")
-ITEM = re.compile(r"(\S.*?) : ((?:[^,;()\[\]{}]|\([^()]*\)|\[[^\[\]]*\]|\{[^{}]*\})*)[,;]\s*(.*)")
-"""Name, type, and what follows it on the line."""
+ITEM = re.compile(
+    r"^(\s*)(\S.*?) : (?!optional)((?:[^,;\n()\[\]{}]|\([^()]*\)|\[[^\[\]]*\]|\{[^{}]*\})*)[,;] "
+    r"*(?!optional)(\S.*)",
+    re.MULTILINE,
+)
+"""Indent, name, type, and what follows it on the line."""
 
 
 def apart(text):
     """Docstring whose lines `name : type, meaning` have the meaning on a line of its own."""
-    lines, section = [], ""
-    for line in text.splitlines():
-        if lines and line and set(line) == {"-"}:
-            section = lines[-1]
-        item = ITEM.fullmatch(line) if section in SECTIONS else None
-        if item and item[3] != "optional":
-            lines += [f"{item[1]} : {item[2]}", f"    {item[3]}"]
-        else:
-            lines.append(line)
-    return "\n".join(lines)
+    return ITEM.sub(r"\1\2 : \3\n\1    \4", text)
 
 
 class Meanings(griffe.Extension):

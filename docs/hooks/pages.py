@@ -1,5 +1,6 @@
 """What pages take from the code: the comment <!-- catalogue.schemes() --> gives way to its text."""
 
+import json
 import re
 from ast import literal_eval
 
@@ -9,12 +10,26 @@ import gallery
 import help_texts
 import quotes
 import schemas
+from mkdocs.structure.files import File
+
+from accelstudy.campaign.calibration.file_format import CalibrationDocument
 
 MODULES = {
     module.__name__: module
     for module in (catalogue, file_formats, gallery, help_texts, quotes, schemas)
 }
+DOCUMENTS = (CalibrationDocument,)
+"""Files whose JSON Schema can be downloaded."""
 CALL = re.compile(r"^<!-- (\w+)\.(\w+)\((.*)\) -->$", re.MULTILINE)
+
+
+def on_files(files, config):
+    """Add the JSON Schemas of documents to the reference."""
+    for one in DOCUMENTS:
+        path = f"reference/{one.file.replace('.json', '.schema.json')}"
+        content = json.dumps(one.model_json_schema(), indent=2, ensure_ascii=False)
+        files.append(File.generated(config, path, content=content))
+    return files
 
 
 def on_page_markdown(markdown, **_):

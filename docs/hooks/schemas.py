@@ -87,15 +87,10 @@ def _type(value, known, links):
             return _type(known[name], known, links)
         links.append(name)
         return "block"
-    if "const" in value:
-        return code(json.dumps(value["const"]))
-    if "enum" in value:
-        return " or ".join(code("null" if each is None else each) for each in value["enum"])
+    if words := value.get("enum", [value["const"]] if "const" in value else ()):
+        return " or ".join(code("null" if each is None else each) for each in words)
     if any_of := value.get("anyOf") or value.get("oneOf"):
-        kinds = [_type(each, known, links) for each in any_of if each.get("type") != "null"]
-        ones = [kind for kind in kinds if f"list of {kind}" not in kinds]
-        if len(ones) < len(kinds):  # one, or a list of such
-            return " or ".join(kind.replace("list of", "one or more of", 1) for kind in ones)
+        kinds = (_type(each, known, links) for each in any_of if each.get("type") != "null")
         return " or ".join(dict.fromkeys(kinds))
     if "prefixItems" in value:
         return f"{len(value['prefixItems'])} numbers"

@@ -11,14 +11,7 @@ from campaign_helpers import simulated_campaign
 
 from accelstudy.basics.errors import InputError
 from accelstudy.campaign.format import write_campaign
-from accelstudy.files.outputs import (
-    CALIBRATION,
-    CAMPAIGN,
-    DIAGNOSIS,
-    new_file,
-    result_folder,
-    whole_file,
-)
+from accelstudy.files.outputs import CALIBRATION, CAMPAIGN, DIAGNOSIS, new_file, whole_file
 
 
 def content(folder):
@@ -38,7 +31,7 @@ def write(folder, **files):
 
 
 def refused(out, kind, inputs=(), force=False):
-    with pytest.raises(InputError) as error, result_folder(out, kind, inputs, force):
+    with pytest.raises(InputError) as error, kind.place(out, inputs, force):
         raise AssertionError("not refused")
     assert "\n" not in str(error.value)
     return str(error.value)
@@ -48,7 +41,7 @@ def refused(out, kind, inputs=(), force=False):
 
 
 def test_a_new_folder_has_usual_permissions(tmp_path):
-    with result_folder(tmp_path / "a/b", CALIBRATION) as folder:
+    with CALIBRATION.place(tmp_path / "a/b") as folder:
         write(folder, calibration_json="1", figures__residuals_png="2")
         assert not (tmp_path / "a").exists()
     assert content(tmp_path / "a/b") == {"calibration.json": b"1", "figures/residuals.png": b"2"}
@@ -62,7 +55,7 @@ def test_an_earlier_result_is_replaced_whole(tmp_path):
     out = tmp_path / "out"
     write(out, diagnosis_json="old", loop_parquet="old", figures__loop_png="old", notes_txt="mine")
     number = out.stat().st_ino
-    with result_folder(out, DIAGNOSIS) as folder:
+    with DIAGNOSIS.place(out) as folder:
         write(folder, diagnosis_json="new", figures__gap_png="new")
     expected = {"diagnosis.json": b"new", "figures/gap.png": b"new", "notes.txt": b"mine"}
     assert content(out) == expected
@@ -76,7 +69,7 @@ def test_a_failed_run_leaves_the_earlier_result(tmp_path, error):
     kind = InputError if isinstance(error, OSError) else ValueError
 
     def run():
-        with result_folder(out, CALIBRATION) as folder:
+        with CALIBRATION.place(out) as folder:
             write(folder, calibration_json="new")
             raise error
 
@@ -99,7 +92,7 @@ def test_a_result_whose_files_are_moved_in_part_is_not_taken_for_whole(tmp_path,
         return replace(self, target)
 
     def run():
-        with result_folder(out, CALIBRATION) as folder:
+        with CALIBRATION.place(out) as folder:
             write(folder, calibration_json="new", report_html="new")
             monkeypatch.setattr(Path, "replace", failing)
 
@@ -111,7 +104,7 @@ def test_a_result_whose_files_are_moved_in_part_is_not_taken_for_whole(tmp_path,
 def test_messages_name_the_place_that_was_asked_for(tmp_path):
     with (
         pytest.raises(InputError, match=f"^{tmp_path}/out/campaign.yaml: wrong$"),
-        result_folder(tmp_path / "out", CAMPAIGN) as folder,
+        CAMPAIGN.place(tmp_path / "out") as folder,
     ):
         raise InputError(f"{folder / 'campaign.yaml'}: wrong")
 
@@ -138,7 +131,7 @@ def test_what_is_there_is_replaced_only_if_asked(tmp_path):
     text = refused(tmp_path, CAMPAIGN)
     assert "not empty (figures, notes.txt, positions.csv)" in text
     assert "`force`" in text
-    with result_folder(tmp_path, CAMPAIGN, force=True) as folder:
+    with CAMPAIGN.place(tmp_path, force=True) as folder:
         write(folder, positions_csv="new", campaign_yaml="new")
     kept = {"notes.txt": b"mine", "figures/mine.png": b"mine"}
     assert content(tmp_path) == {"positions.csv": b"new", "campaign.yaml": b"new", **kept}

@@ -32,10 +32,10 @@ TRUTH = {"b_x": 0.05, "s_z": 2e-4, "alpha_zx": 7e-4}
 AT_REST = np.random.default_rng(1).normal([0.5, -0.3, -9.7], 0.3, (30, 3))
 LOG = pd.DataFrame(AT_REST, columns=["fx", "fy", "fz"])
 SETTINGS = {
-    "name": "log", "columns": {"fx": 0, "fy": "fy", "fz": 2}, "rate_hz": 10.0, "unit": "counts",
+    "name": "log", "columns": {"fx": 0, "fy": "fy", "fz": 2}, "rate": 10.0, "unit": "counts",
     "scale": [1.0, 1.1, 1.0], "offset": 0.1, "gravity": {"value_mps2": 9.81, "sigma_mps2": 0.0},
-    "frame": "flu", "range_mps2": 1000.0, "exclude": [], "window_s": 1.0,
-    "threshold_mps2": 10.0, "trim_s": 0.0, "shortest_s": 1.0,
+    "frame": "flu", "range": 1000.0, "exclude": [], "window": 1.0,
+    "threshold": 10.0, "trim": 0.0, "shortest": 1.0,
 }  # fmt: skip
 CONTENTS = {
     "settings.yaml": SETTINGS, "study.yaml": study_content(),

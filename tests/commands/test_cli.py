@@ -9,7 +9,7 @@ import numpy as np
 import pandas as pd
 import pytest
 import yaml
-from calling import call, succeed
+from calling import call, refusal, succeed
 from click.testing import CliRunner
 from study_helpers import NINE, PROVENANCE, content, grid
 
@@ -18,7 +18,7 @@ from accelstudy.basics.errors import InputError
 from accelstudy.commands.main import main
 from accelstudy.files.tables import write_table
 from accelstudy.schemes import get_scheme, scheme_families, scheme_names
-from accelstudy.sensors.models import MODELS, PRESETS, get_model
+from accelstudy.sensors.models import MODELS
 
 
 def output(*arguments):
@@ -108,15 +108,6 @@ def test_directions_of_a_scheme():
     assert all(np.linalg.norm(row[:3]) == pytest.approx(1) for row in rows)
 
 
-def test_models():
-    lines = output("models").splitlines()
-    for model in map(get_model, MODELS):
-        assert f"{model.name} ({model.n_parameters}): {', '.join(model.parameter_names)}" in lines
-    for preset in PRESETS:
-        line = f" *{re.escape(preset.source)} +{preset.model} in {preset.scheme}"
-        assert any(re.fullmatch(line, each) for each in lines)
-
-
 # --- the unit of angles --------------------------------------------------------------------------
 
 
@@ -125,16 +116,17 @@ def test_angles_in_degrees(monkeypatch):
     assert "pole/gon" in gon
     assert "100 gon = 90°" in gon
     for arguments in (
-        ("--angle-unit", "deg", "scheme", "faces-6"),
         ("scheme", "faces-6", "--angle-unit", "deg"),
-        ("--angle-unit", "gon", "scheme", "faces-6", "--angle-unit", "deg"),
+        ("scheme", "--angle-unit", "gon", "faces-6", "--angle-unit", "deg"),
     ):
         table = output(*arguments).splitlines()
         assert table[1].endswith("roll_deg,pitch_deg")
         assert table[4].endswith(",-90.000000")  # nose up
         assert output("schemes", "mclaren-24") == gon  # the choice ends with its command
-    assert "alpha_zx [mdeg]" in output("effects", "--angle-unit", "deg")
-    assert "alpha_zx [mgon]" in output("effects")
+    assert " … 28.6 mdeg\n" in output("effects", "--angle-unit", "deg")
+    assert " … 31.8 mgon\n" in output("effects")
+    line = refusal("--angle-unit", "deg", "effects")
+    assert line == "error: --angle-unit: give it after the command\n"
     monkeypatch.setenv("ACCELSTUDY_ANGLE_UNIT", "deg")
     assert "pole/deg" in output("schemes", "mclaren-24")
     assert output("schemes", "mclaren-24", "--angle-unit", "gon") == gon
@@ -146,17 +138,17 @@ def test_angles_in_degrees(monkeypatch):
 def test_cells(tmp_path):
     base, over = tmp_path / "base.yaml", tmp_path / "over.yaml"
     base.write_text(yaml.safe_dump(content(grids=[grid(schemes=["faces-6", "mclaren-24"])])))
-    *lines, gap, effort = output("cells", base).splitlines()
-    assert len(lines) == 4
-    assert gap == ""
-    assert effort.startswith("4 cells, up to 240 calibrations")
-    assert f"{NINE}/mclaren-24/gravity: r = 15, 60 replicates" in lines
-    assert f"{NINE}/mclaren-24/robot: r = 63, 60 replicates" in lines
-    assert lines[0].startswith(f"{NINE}/faces-6/gravity: rank 6 of 9: alpha_yz, ")
+    _, *lines, gap, effort = output("cells", base).splitlines()
+    assert (gap, effort) == ("", "4 cells, up to 240 calibrations")
+    rows = [line.split(maxsplit=3) for line in lines]
+    assert rows[1:] == [
+        [f"{NINE}/faces-6/robot", "9", "60"],
+        [f"{NINE}/mclaren-24/gravity", "15", "60"],
+        [f"{NINE}/mclaren-24/robot", "63", "60"],
+    ]
+    assert rows[0][3].startswith("rank 6 of 9: alpha_yz, ")
     over.write_text(yaml.safe_dump({"grids": [grid(approaches="robot", replicates=7)]}))
-    assert output("cells", base, over).startswith(
-        f"{NINE}/mclaren-24/robot: r = 63, 7 replicates\n\n"
-    )
+    assert output("cells", base, over).splitlines()[1].split() == [rows[3][0], "63", "7"]
 
 
 def test_claims(tmp_path):

@@ -103,7 +103,7 @@ def test_an_error_of_the_system_is_one_line():
     assert result.exit_code == 2
 
 
-@pytest.mark.parametrize("arguments", [["models"], ["plan", "--help"], ["--version"]])
+@pytest.mark.parametrize("arguments", [["catalogue", "models"], ["plan", "--help"], ["--version"]])
 def test_a_full_disk_behind_the_output_is_one_line(arguments):
     with open("/dev/full", "w") as full:
         ended = started("", *arguments, stdout=full)
@@ -114,14 +114,13 @@ def test_a_full_disk_behind_the_output_is_one_line(arguments):
 def test_a_reader_that_needs_no_more_is_no_error():
     end, start = os.pipe()
     os.close(end)
-    ended = started("", "models", stdout=start)
+    ended = started("", "catalogue", "models", stdout=start)
     os.close(start)
     assert ended.stderr == ""
 
 
 def test_figures_need_no_backend():
     code = "import atexit, os\natexit.register(lambda: __import__('matplotlib.figure'))"
-    ended = started(
-        code, "models", env={**os.environ, "MPLBACKEND": "nonsense"}, stdout=subprocess.DEVNULL
-    )
+    environment = {**os.environ, "MPLBACKEND": "nonsense"}
+    ended = started(code, "catalogue", "models", env=environment, stdout=subprocess.DEVNULL)
     assert (ended.returncode, ended.stderr) == (0, "")

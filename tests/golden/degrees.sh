@@ -9,7 +9,7 @@ accelstudy compare spring/calibration.json autumn/calibration.json --out both
 accelstudy history spring/calibration.json autumn/calibration.json winter/calibration.json --date 2025-04-01 --date 2025-10-01 --date 2026-01-15 --out years
 accelstudy schemes --approach robot fibonacci-24 mclaren-24
 accelstudy scheme fibonacci-24
-accelstudy models
+accelstudy catalogue models
 accelstudy effects --campaign of-spring
 accelstudy check-sigmas my-campaign --replicates 100
 accelstudy design --positions 9 --starts 1 --tilt-range 30deg --out scheme.yaml

@@ -18,9 +18,9 @@ accelstudy lot of-spring of-autumn of-winter --quiet --out lot
 accelstudy design --quiet --positions 6 --starts 1 --model bias --attitudes cube --out scheme.yaml
 accelstudy schemes --quiet faces-6
 accelstudy effects --quiet
-accelstudy public --quiet
+accelstudy catalogue public-data --quiet
 accelstudy batch of-spring of-autumn --quiet --out batch
-accelstudy models --quiet | tail -n 3
+accelstudy catalogue models --quiet | tail -n 3
 accelstudy scheme --quiet faces-6
 accelstudy cells --quiet config/config.yaml config/smoke.yaml | tail -n 3
 accelstudy config-schema --quiet | tail -n 3

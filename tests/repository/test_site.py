@@ -21,6 +21,7 @@ from study_helpers import grid, make_study, run_study
 import accelstudy
 from accelstudy.campaign.batch import COLUMNS, PARAMETERS
 from accelstudy.campaign.calibration.document import json_text
+from accelstudy.campaign.calibration.file_format import CalibrationDocument
 from accelstudy.lots.evidence import SensorEvidence
 from accelstudy.lots.lot import LotDiagnosis
 from accelstudy.lots.mixture import LotTest
@@ -81,8 +82,10 @@ def test_each_key_and_column_of_a_calibration_is_described(tmp_path):
     one, three = each[0], accelstudy.history(each, dates=dates)
     one.save(tmp_path / "one")
     three.save(tmp_path / "three")
+    schema = strict(CalibrationDocument.model_json_schema())
+    said = [error.message for error in Draft202012Validator(schema).iter_errors(one.content)]
+    assert said == []
     written = {
-        "calibration": one.content,
         "comparison": accelstudy.compare(one, one).content,
         "history": three.content,
         "lot": {**_lot(), "files": []},
@@ -141,5 +144,5 @@ def test_the_reference_says_what_the_kinds_of_keywords_mean():
     module = griffe.visit("accelstudy.verbs.calibrations", path, path.read_text(encoding="utf-8"))
     import_module("meanings").Meanings().on_object(obj=module["diagnose"])
     said = module["diagnose"].docstring.value
-    assert "\nmodel : str\n    A model: one that `accelstudy models` lists" in said
+    assert "\nmodel : str\n    A model: one that `accelstudy catalogue models` lists" in said
     assert said == inspect.getdoc(accelstudy.diagnose)

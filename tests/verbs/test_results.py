@@ -347,8 +347,7 @@ def test_a_script_of_a_user_takes_six_lines(guide, folder, calibrations, task, m
 
 
 def test_catalogues_are_tables():
-    for kind in ("effects", "noise effects", "models", "schemes", "approaches",
-                 "data sheets"):  # fmt: skip
+    for kind in ("effects", "models", "schemes", "approaches", "data sheets", "public data"):
         table = acs.catalogue(kind)
         assert len(table) > 0
         assert table.index.is_unique

@@ -3,7 +3,6 @@
 import inspect
 import json
 import pickle
-import re
 from dataclasses import fields
 from io import StringIO
 from typing import Any
@@ -18,6 +17,7 @@ from study_helpers import content, grid
 import accelstudy
 from accelstudy.basics.errors import OPTIONS
 from accelstudy.basics.units import STANDARD_GRAVITY
+from accelstudy.campaign.importing.settings import ImportSettings, parse_settings
 from accelstudy.campaign.simulated import CampaignSettings, simulate_campaign
 from accelstudy.commands.main import main
 from accelstudy.verbs import kinds
@@ -97,10 +97,14 @@ def test_what_is_printed_is_what_the_function_returns(tmp_path: Any) -> None:
     assert json.loads(said("config-schema")) == accelstudy.config_schema()
     table = pd.read_csv(StringIO(said("scheme", "faces-6").partition("\n")[2]), index_col=0)
     pd.testing.assert_frame_equal(table, accelstudy.scheme("faces-6"), atol=1e-6)
-    for name, row in accelstudy.models().iterrows():
-        assert f"{name} ({row['n_parameters']}): {row['parameters']}\n" in said("models")
+    for kind in ("effects", "models", "public-data"):
+        table, lines = accelstudy.catalogue(kind), said("catalogue", kind).splitlines()
+        assert [line for line in lines if line[0] != " "] == [
+            f"{name}: {first}" for name, first in table.iloc[:, 0].items()
+        ]
     for name, row in accelstudy.cells(config).iterrows():
-        assert f"{name}: {row['reason'] or f'r = {row.redundancy}, '}" in said("cells", config)
+        words = [name, str(row["redundancy"]), str(row["replicates"]), *row["reason"].split()]
+        assert words in [line.split() for line in said("cells", config).splitlines()]
     for words, table in (
         (("schemes", "faces-6", "mclaren-24"), accelstudy.list_schemes(["faces-6", "mclaren-24"])),
         (("effects", "--scheme", "mclaren-24"), accelstudy.list_effects(scheme="mclaren-24")),
@@ -114,7 +118,6 @@ def test_what_is_printed_is_what_the_function_returns(tmp_path: Any) -> None:
     with pytest.raises(accelstudy.InputError, match="`campaign` and `scheme` exclude each other"):
         accelstudy.list_effects(campaign=campaign, scheme="mclaren-24")
     assert accelstudy.init(tmp_path / "mine") in said("init", tmp_path / "mine", "--force")
-    assert [*accelstudy.public().index] == re.findall(r"^([\w-]+):", said("public"), re.MULTILINE)
 
 
 def test_a_simulated_campaign_has_the_keywords_and_defaults_of_its_settings() -> None:
@@ -138,6 +141,19 @@ def test_the_noise_of_the_robot_has_one_name(verb: str, old: str) -> None:
         option = f"--{old.replace('_', '-')}"
         line = refusal(verb, option, "3mgon", "--out", "none")
         assert line == f"error: {option}: no longer an option; --robot-sigma takes it\n"
+
+
+def test_keywords_of_an_import_are_the_keys_of_its_settings() -> None:
+    """But those of a reference; robot and sensor are blocks and texts of a file alone."""
+    keys = {one.alias or name for name, one in ImportSettings.model_fields.items()}
+    keywords = {*kinds.keywords(accelstudy.find_holds)} - {"robot_sigma", "robot_unit", "settings"}
+    assert {name for name in keywords if not name.startswith("reference")} == keys - {
+        "robot", "sensor",
+    }  # fmt: skip
+    for text, si in (("8g", 8 * STANDARD_GRAVITY), (30, 30.0)):
+        assert parse_settings({"range": text}).full_range == si
+    for before, now in (({"rate_hz": 50}, {"rate": "50Hz"}), ({"window_s": 2}, {"window": "2s"})):
+        assert parse_settings(before) == parse_settings(now)
 
 
 def test_a_message_calls_a_keyword_as_its_user_does() -> None:

@@ -92,7 +92,7 @@ def calibration_document(assessment: Assessment) -> dict[str, Any]:
         "excluded": campaign.exclusions,
         "range_mps2": campaign.full_range,
         "ranges": {k: [v.min(), v.max()] for k, v in ranged.items() if v is not None},
-        "log": None if campaign.log is None else campaign.log.model_dump(exclude_none=True),
+        "log": campaign.log and campaign.log.model_dump(exclude_none=True, by_alias=True),
         "warnings": campaign.warnings,
         "quality": _quality(assessment),
     }

@@ -7,28 +7,17 @@ from dataclasses import dataclass, field
 from functools import cached_property
 from os import PathLike
 from pathlib import Path
-from typing import Annotated, Any, Literal, Self
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
-from pydantic import AfterValidator, BaseModel, ConfigDict, Field, model_validator
 
-from accelstudy.basics import bounds
 from accelstudy.basics.arguments import check_type, path_of
-from accelstudy.basics.bounds import Range
 from accelstudy.basics.errors import InputError
-from accelstudy.campaign.header import ANY, LogLayout, Nominal, PerAxis
+from accelstudy.campaign.calibration.file_format import CalibrationDocument
+from accelstudy.campaign.header import LogLayout
 from accelstudy.effects import HoldConditions, TemperatureCourse
 from accelstudy.effects.hold_conditions import REFERENCE_TEMPERATURE
-from accelstudy.files.reading import read_json
-from accelstudy.files.validation import (
-    Gravity,
-    Number,
-    ParameterSigma,
-    ParameterValue,
-    bounds_of,
-    validate,
-)
 from accelstudy.leveling.angles import angles_of, tilt_by_output, tilt_slope
 from accelstudy.sensors.conversion import Conversion, conversion_of
 from accelstudy.sensors.models import compose
@@ -37,16 +26,8 @@ from accelstudy.sensors.sensor import SensorModel
 Array = NDArray[np.float64]
 
 
-NO_CALIBRATION = "not a calibration.json of accelstudy"
 RANGE_MARGIN = 0.1
 """Part of the width of a range by which a log may leave it without a warning."""
-REDUNDANCY, VARIANCE = Range(0, 10**9), Range(-1e18, 1e18)
-LEAST_VARIANCE = 1e-40
-"""SI, variance below that of any estimate."""
-LEAST_REGULAR = 1e12
-"""Condition of a matrix beyond which it has no inverse."""
-CORRELATION_TOLERANCE = 1e-6
-"""Numerical tolerance of the checks of a correlation matrix."""
 FORCES = {"fx_mps2": "forward", "fy_mps2": "right", "fz_mps2": "down"}
 """Ranges of the calibrated forces, and where they point."""
 KNOWN = {"temperature": "temperature_degC", "time": "time_s", "vibration": "vibration_mps2"}
@@ -235,110 +216,6 @@ class SensorCalibration:
         return forces + change[..., 0], share
 
 
-class _Content(BaseModel):
-    """A part of `calibration.json`: what is used of it is checked, the rest is kept."""
-
-    model_config = ConfigDict(extra="allow")
-
-
-class _Parameter(_Content):
-    name: str
-    value: ParameterValue
-    sigma: ParameterSigma | None
-    unit: str
-
-
-def _regular(matrix: list[list[float]]) -> list[list[float]]:
-    if np.linalg.cond(np.array(matrix)) > LEAST_REGULAR:
-        raise ValueError("must be a matrix that has an inverse")
-    return matrix
-
-
-def _check_ends(ends: list[float]) -> list[float]:
-    if ends[0] > ends[1]:
-        raise ValueError("must be the smallest and the largest value, in this order")
-    return ends
-
-
-Triple = Annotated[list[ParameterValue], PerAxis]
-Regular = Annotated[list[Triple], PerAxis, AfterValidator(_regular)]
-Ends = Annotated[
-    list[Annotated[float, *bounds_of(ANY)]],
-    Field(min_length=2, max_length=2),
-    AfterValidator(_check_ends),
-]
-
-
-class _CorrectionDocument(_Content):
-    error: str
-    reason: str
-    matrix: Regular | None
-
-
-class _Quality(_Content):
-    state: str = ""
-    plausible: bool = True
-    warnings: list[str] = []
-
-
-class _Document(_Content):
-    """What is used of `calibration.json`; the rest is for people and other programs."""
-
-    schema_version: Annotated[Literal[1], Number]
-    campaign: str
-    sensor: str | None = None
-    date: str | None = None
-    model: str
-    approach: str = ""
-    n_positions: Annotated[int, *bounds_of(bounds.POSITIONS)] | None = None
-    effects: Annotated[list[str], Field(min_length=1)]
-    unit: Literal["m/s^2", "g", "mg", "counts"]
-    nominal: Nominal | None
-    gravity_mps2: Gravity
-    sigma_source: Literal["a priori", "a posteriori"] = "a posteriori"
-    redundancy: Annotated[int, *bounds_of(REDUNDANCY)] = 0
-    sigma_dof: Annotated[float, *bounds_of(REDUNDANCY)] | None = None
-    sigma_position_mps2: ParameterSigma | None
-    sigma_reading_mps2: ParameterSigma | None = None
-    sigmas_95: ParameterSigma | None = None
-    parameters: list[_Parameter]
-    covariance: list[list[Annotated[float, *bounds_of(VARIANCE)] | None]]
-    log: LogLayout | None = None
-    range_mps2: ParameterSigma | None = None
-    mended: _CorrectionDocument | None = None
-    quality: _Quality = _Quality()
-    ranges: dict[str, Ends] = {}
-    warnings: list[str] = []
-
-    @model_validator(mode="after")
-    def _whole(self) -> Self:
-        names = list(compose(self.model, tuple(self.effects)).parameter_names)
-        if [entry.name for entry in self.parameters] != names:
-            raise ValueError(f"parameters: expected {', '.join(names)}, in this order")
-        if {len(row) for row in self.covariance} | {len(self.covariance)} != {len(names)}:
-            raise ValueError(f"covariance: expected {len(names)} rows of {len(names)} numbers")
-        covariance = np.array(self.covariance, dtype=float)  # None becomes NaN
-        if (known := np.isfinite(np.diag(covariance))).any():
-            _check_covariance(covariance[np.ix_(known, known)])
-            if self.sigma_source == "a posteriori" and self.redundancy < 1:
-                raise ValueError("redundancy: must be 1 or more where sigmas are a posteriori")
-        if self.unit == "counts" and self.nominal is None:
-            raise ValueError("nominal: missing; unit: counts needs it")
-        return self
-
-
-def _check_covariance(covariance: Array) -> None:
-    """Raise `ValueError` unless a matrix (u, u) can be that of estimates."""
-    variances = np.diag(covariance)
-    if not np.isfinite(covariance).all() or not (variances > LEAST_VARIANCE).all():
-        raise ValueError("covariance: expected variances above 0")
-    correlation = covariance / np.outer(np.sqrt(variances), np.sqrt(variances))
-    if np.abs(correlation - correlation.T).max() > CORRELATION_TOLERANCE:
-        raise ValueError("covariance: must be symmetric")
-    if np.linalg.eigvalsh(correlation)[0] < -CORRELATION_TOLERANCE:
-        raise ValueError("covariance: no estimates have it; it is not positive semidefinite")
-
-
 def read_calibration(path: str | Path) -> SensorCalibration:
     """Read a calibration.json, given by itself or by its folder.
 
@@ -347,9 +224,7 @@ def read_calibration(path: str | Path) -> SensorCalibration:
     InputError
         If there is no such file, or it is not a calibration.
     """
-    path = Path(path)
-    path = path / "calibration.json" if path.is_dir() else path
-    return calibration_of(read_json(path, NO_CALIBRATION), f"{path}: {NO_CALIBRATION}")
+    return _of_document(CalibrationDocument.read(path), str(path))
 
 
 def sensor_of(given: Any, name: str = "calibration") -> SensorCalibration:
@@ -363,15 +238,13 @@ def sensor_of(given: Any, name: str = "calibration") -> SensorCalibration:
     return sensor
 
 
-def calibration_of(content: Any, where: str = NO_CALIBRATION) -> SensorCalibration:
-    """Take the content of `calibration.json`; `where` begins the message if it is something else.
+def calibration_of(content: Any) -> SensorCalibration:
+    """Take the content of `calibration.json`; raise `InputError` if it is something else."""
+    return _of_document(CalibrationDocument.check(content), CalibrationDocument.refusal())
 
-    Raises
-    ------
-    InputError
-        If it is no calibration.
-    """
-    document = validate(_Document, content, where)
+
+def _of_document(document: CalibrationDocument, where: str) -> SensorCalibration:
+    """Take the part of a calibration that belongs to the sensor."""
     # Effects of the rig were estimated together with those of the sensor, but stay with the rig.
     estimated = compose(document.model, tuple(document.effects))
     model, stays = estimated.without_rig, np.flatnonzero(estimated.stays)
@@ -386,7 +259,7 @@ def calibration_of(content: Any, where: str = NO_CALIBRATION) -> SensorCalibrati
         parameters=parameters,
         covariance=covariance[np.ix_(stays, stays)],
         gravity=document.gravity_mps2,
-        content=document.model_dump(),
+        content=document.model_dump(by_alias=True),
         log=document.log,
         ranges=document.ranges,
     )

@@ -22,6 +22,7 @@ from accelstudy.files.validation import (
     Positive,
     SigmaAngle,
     SigmaGravity,
+    in_unit,
     validate,
 )
 
@@ -34,7 +35,9 @@ _EXCLUDED = re.compile(r"(\d{1,9}(?:\s*,\s*\d{1,9})*)\s*:\s*(\S.*)", re.DOTALL)
 class GravitySettings(ConfigSection):
     """Gravity where the sensor was."""
 
-    value_mps2: Gravity = Field(STANDARD_GRAVITY, description="local gravity, m/s²")
+    value_mps2: Annotated[Gravity, in_unit("m/s^2")] = Field(
+        STANDARD_GRAVITY, description="local gravity, m/s²"
+    )
     sigma_mps2: SigmaGravity = Field(0.0, description="its standard deviation; 0 holds it fixed")
 
 
@@ -62,17 +65,25 @@ class ImportSettings(LogLayout):
     sensor: str | None = Field(None, description="what was calibrated")
     gravity: GravitySettings = GravitySettings()
     robot: RobotSettings | None = Field(None, description="with means: the robot's angles")
-    range_mps2: Annotated[Positive, _LARGE] | None = Field(
-        None, description="the sensor measures ± this"
+    range_mps2: Annotated[Annotated[Positive, _LARGE] | None, in_unit("m/s^2")] = Field(
+        None, alias="range", description="the sensor measures ± this"
     )
-    window_s: Positive | None = Field(
-        None, description="length of the sliding window; 1 s, or 9 samples if these last longer"
+    window_s: Annotated[Positive | None, in_unit("s")] = Field(
+        None,
+        alias="window",
+        description="length of the sliding window; 1 s, or 9 samples if these last longer",
     )
-    threshold_mps2: Annotated[Positive, _LARGE] | None = Field(
-        None, description="sd of a window at rest; chosen from the data if absent"
+    threshold_mps2: Annotated[Annotated[Positive, _LARGE] | None, in_unit("m/s^2")] = Field(
+        None,
+        alias="threshold",
+        description="sd of a window at rest; chosen from the data if absent",
     )
-    trim_s: NotNegative = Field(0.2, description="cut from both ends of a hold")
-    shortest_s: Positive = Field(1.0, description="shortest hold")
+    trim_s: Annotated[NotNegative, in_unit("s")] = Field(
+        0.2, alias="trim", description="cut from both ends of a hold"
+    )
+    shortest_s: Annotated[Positive, in_unit("s")] = Field(
+        1.0, alias="shortest", description="shortest hold"
+    )
     exclude: list[str] = Field(
         [], description="holds to leave out, and why, as 13:moved or 13,14:somebody passed"
     )
