@@ -25,8 +25,7 @@ def run_study(*configurations: str | Path) -> dict[str, pd.DataFrame]:
     -------
     dict of DataFrame
         The tables that the workflow writes, by their names: cells, summary, correlations, leveling
-        and quantiles; with `sensitivity` also sensitivity and shapley, with `paper` also claims and
-        claims_by_scheme.
+        and quantiles; with `sensitivity` also sensitivity and shapley, with `paper` also claims.
 
     Raises
     ------
@@ -44,5 +43,5 @@ def study_tables(study: Study) -> dict[str, pd.DataFrame]:
         tables["shapley"] = shapley_table(study, tables["summary"], tables["correlations"])
     if study.paper:
         data = ClaimData(study, tables)
-        tables |= {"claims": judge(data), "claims_by_scheme": data.by_scheme}
+        tables["claims"] = judge(data)
     return tables

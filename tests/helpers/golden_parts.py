@@ -246,7 +246,7 @@ def real_data(folder) -> Texts:
 # --- studies -------------------------------------------------------------------------------------
 
 TABLES = ("cells", "summary", "correlations", "leveling", "quantiles", "claims",
-          "claims_by_scheme", "sensitivity", "shapley")  # fmt: skip
+          "sensitivity", "shapley")  # fmt: skip
 
 
 def study(folder, name, configuration) -> Texts:

@@ -16,6 +16,7 @@ from accelstudy.basics.units import MGON
 from accelstudy.files.tables import read_table, write_table
 from accelstudy.leveling.sensitivity import leveling_sensitivity
 from accelstudy.sensors.models import get_model
+from accelstudy.study.claims import quantities
 from accelstudy.study.claims.page import claims_markdown, claims_page
 from accelstudy.study.claims.quantities import ClaimData, claim_table, single_reductions
 from accelstudy.study.claims.verdicts import (
@@ -66,14 +67,10 @@ def tables(folder):
 
 @pytest.fixture(scope="module")
 def data(tables):
-    """Function that gives the data where the study, its tables or `by_scheme` are others."""
-    usual = ClaimData(make_study(**KEYS), tables)
+    """Function that gives the data where the study or its tables are others."""
 
-    def of(by_scheme=usual.by_scheme, noise=(), **changed):
-        study = make_study(**KEYS, noise=dict(noise))
-        other = ClaimData(study, {**tables, **changed})
-        vars(other)["by_scheme"] = by_scheme
-        return other
+    def of(noise=(), **changed):
+        return ClaimData(make_study(**KEYS, noise=dict(noise)), {**tables, **changed})
 
     return of
 
@@ -85,7 +82,7 @@ def judged(data):
 
 def claim_of(name, data):
     """The row of one claim of the paper."""
-    (claim,) = (each for each in claim_table()["paper"] if each["claim"] == name)
+    (claim,) = (each for each in claim_table() if each["claim"] == name)
     return judge_claim(claim, data)
 
 
@@ -112,15 +109,15 @@ def test_order_of_the_inputs(tables, judged, data):
     (0, (-5, 5), NOT_REPRODUCED),
     (41, (-10, 65), REPRODUCED),  # single simulations spread over the paper's number
 ])  # fmt: skip
-def test_verdict_on_a_reduction(tables, judged, data, mean, central, verdict):
+def test_verdict_on_a_reduction(tables, judged, data, mean, central, verdict, monkeypatch):
     low, high = central
     single = {"single_low": low, "single_high": high, "percentile": 12.34}
+    monkeypatch.setattr(quantities, "single_reductions", lambda *_: single)
     summary = tables["summary"].copy()
     at = (summary["approach"] == "robot") & summary["parameter"].str.startswith("b_")
     factor = (100 - mean) / (100 - judged.loc["reduction-bias", "ours"])
     summary.loc[at, "sd_posteriori_mean"] *= factor
-    changed = data(by_scheme=data().by_scheme.assign(**single), summary=summary)
-    claim = claim_of("reduction-bias", changed)
+    claim = claim_of("reduction-bias", data(summary=summary))
     assert claim["verdict"] == verdict
     assert claim["ours"] == pytest.approx(mean, abs=1e-9)
     assert (claim["single_low"], claim["single_high"]) == (low, high)
@@ -154,11 +151,7 @@ def test_verdict_on_the_correlation(tables, data, claim, factor, rest, verdict):
 def test_a_scheme_without_redundancy_has_no_reduction(tables, data):
     summary = tables["summary"].copy()
     summary.loc[summary["scheme"] == "rings-24", "sd_posteriori_mean"] = np.nan
-    usual = data()
-    other = ClaimData(usual.study, {**tables, "summary": summary})
-    reductions = other.by_scheme[other.by_scheme["claim"].str.startswith("reduction")]
-    assert set(reductions["scheme"]) == {"mclaren-24"}
-    assert "of 1 schemes" in claim_of("reduction-bias", other)["sentence"]
+    assert "of 1 schemes" in claim_of("reduction-bias", data(summary=summary))["sentence"]
 
 
 def test_single_simulations_are_those_of_the_estimates(tables, data):
@@ -184,25 +177,23 @@ def test_single_simulations_are_those_of_the_estimates(tables, data):
 # --- for people ----------------------------------------------------------------------------------
 
 
-def test_every_claim_is_on_the_page_and_in_the_markdown(judged, data):
-    claims, schemes = judged.reset_index(), data().by_scheme.assign(scheme="<b>&</b>")
-    page, text = claims_page(claims, schemes), claims_markdown(claims)
+def test_every_claim_is_on_the_page_and_in_the_markdown(judged):
+    claims = judged.reset_index()
+    page, text = claims_page(claims), claims_markdown(claims)
     for row in claims.to_dict("records"):
         for words in (row["statement"], row["sentence"], row["verdict"]):
             assert words in text_of(page)
             assert words in text
     assert [line.count("|") for line in text.splitlines()] == [7] * (len(claims) + 2)
-    assert "<b>&</b>" not in page
-    assert "&lt;b&gt;&amp;&lt;/b&gt;" in page
+    assert "&lt;b&gt;&amp;&lt;/b&gt;" in claims_page(claims.assign(statement="<b>&</b>"))
     assert not re.search(r"\bnan\b", page + text, re.IGNORECASE)
     assert not re.search(r"(src|href)=[\"']https?:", page)
 
 
-def test_claims_as_the_workflow_judges_them(tables, folder, judged, data, tmp_path):
+def test_claims_as_the_workflow_judges_them(tables, folder, judged, tmp_path):
     """From files to files."""
     outputs = {
         "claims": tmp_path / "claims.parquet",
-        "by_scheme": tmp_path / "by_scheme.parquet",
         "html": tmp_path / "claims.html",
     }
     judge_claims(
@@ -213,5 +204,4 @@ def test_claims_as_the_workflow_judges_them(tables, folder, judged, data, tmp_pa
     )
     claims = read_table(outputs["claims"])
     pd.testing.assert_frame_equal(claims.set_index("claim"), judged, check_dtype=False)
-    assert len(read_table(outputs["by_scheme"])) == len(data().by_scheme)
     assert outputs["html"].read_text(encoding="utf-8").lower().startswith("<!doctype html>")

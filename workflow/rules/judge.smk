@@ -39,7 +39,6 @@ rule claims:
         shapley=f"{RESULTS}/shapley.parquet",
     output:
         claims=f"{RESULTS}/claims.parquet",
-        by_scheme=f"{RESULTS}/claims_by_scheme.parquet",
         html=report(
             f"{RESULTS}/claims.html",
             caption="../report/claims.rst",

@@ -14,14 +14,13 @@ Rows = list[dict[Any, str]]
 """Rows of a table, each with its texts by the heads of the columns."""
 
 
-def claims_page(claims: pd.DataFrame, by_scheme: pd.DataFrame) -> str:
+def claims_page(claims: pd.DataFrame) -> str:
     """Page (HTML, self-contained) with all claims and their verdicts."""
     from accelstudy.pages import render  # which shows numbers as here
 
     return render(
         "study/claims/page.html.j2",
         claims=claim_rows(claims),
-        schemes=_scheme_rows(by_scheme),
         next_steps=[
             ("See what another study would run", f"accelstudy cells config/config.yaml {SWEEP}"),
             ("Run it", f"snakemake --cores 2 --configfile {SWEEP}"),
@@ -54,12 +53,3 @@ def claim_rows(claims: pd.DataFrame) -> Rows:
         }
         rows.append(row)
     return rows
-
-
-def _scheme_rows(by_scheme: pd.DataFrame) -> Rows:
-    numbers = ["paper", "mean", "median", "percentile"]
-    texts = by_scheme[["claim", "scheme"]].join(by_scheme[numbers].map(number))
-    ends = zip(by_scheme["single_low"], by_scheme["single_high"], strict=True)
-    texts.insert(5, "range", [interval(*pair) for pair in ends])
-    texts = texts.rename(columns={"percentile": "percentile of the paper's number"})
-    return texts.to_dict("records")

@@ -6,7 +6,7 @@ claim, and further numbers that its rule or its sentence uses.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cache, cached_property
 from pathlib import Path
@@ -35,10 +35,10 @@ TILT = 50.0
 
 
 @cache
-def claim_table() -> dict[str, list[dict[str, Any]]]:
+def claim_table() -> list[dict[str, Any]]:
     """Read the claims."""
     text = Path(__file__).with_name("claims.yaml").read_text(encoding="utf-8")
-    return dict(yaml.safe_load(text))
+    return list(yaml.safe_load(text))
 
 
 @dataclass(frozen=True)
@@ -72,34 +72,6 @@ class ClaimData:
         """Rows of a table that are of one cell."""
         rows = self.tables[table]
         return rows[rows["cell"] == self.settings.cell(approach, scheme)]
-
-    @cached_property
-    def by_scheme(self) -> pd.DataFrame:
-        """What single simulations show in each scheme, and where the paper's number lies.
-
-        One row per claim and scheme: the paper's number; the `mean` of single simulations, their
-        `single_low`, `median` and `single_high` (the central 95 %), and the `percentile` of the
-        paper's number among them. Correlations hardly change from run to run; theirs are the least,
-        the median and the largest of the pairs of scales.
-        """
-        rows = []
-        for claim in claim_table()["by_scheme"]:
-            for scheme in self.schemes:
-                row = {"claim": claim["claim"], "scheme": scheme, "paper": claim["paper"]}
-                if "scales" in claim:
-                    pairs = scale_pairs(self, claim["scales"], scheme)
-                    ends = _ends(np.quantile(pairs, [0, 0.5, 1]))
-                    rows.append({**row, "mean": pairs.mean(), **ends})
-                    continue
-                mean = mean_reduction(self, claim["effect"], scheme)["value"]
-                if not np.isnan(mean):  # without redundancy there is no sd a posteriori
-                    single = single_reductions(self, claim["effect"], scheme, claim["paper"])
-                    rows.append({**row, "mean": mean, **single})
-        return pd.DataFrame(rows)
-
-    def single_simulations(self, claim: str) -> pd.DataFrame:
-        """What single simulations show of a claim, a row each scheme."""
-        return self.by_scheme[self.by_scheme["claim"] == claim].set_index("scheme")
 
 
 def estimate(value: float, half: float, **others: Any) -> Numbers:
@@ -219,19 +191,28 @@ def mean_reduction(data: ClaimData, effect: str, scheme: str = "") -> Numbers:
     return estimate(100 - left, Z95 * left * error)
 
 
-def reduction(data: ClaimData, effect: str) -> Numbers:
-    """Return `mean_reduction` in the scheme of the claims, and what single simulations show."""
-    rows = data.single_simulations(f"reduction-{effect}")
-    names = sorted(rows.index[rows["paper"].between(rows["single_low"], rows["single_high"])])
+def reduction(data: ClaimData, effect: str, paper: float) -> Numbers:
+    """Return `mean_reduction` in the scheme of the claims, and what single simulations show.
+
+    Without redundancy a scheme has no sd a posteriori, and does not count.
+    """
+    single = {
+        scheme: single_reductions(data, effect, scheme, paper)
+        for scheme in data.schemes
+        if not np.isnan(mean_reduction(data, effect, scheme)["value"])
+    }
+    within = (name for name, s in single.items() if s["single_low"] <= paper <= s["single_high"])
+    names = sorted(within)
     named = f" ({', '.join(names)})" if 0 < len(names) <= 4 else ""
-    single = rows.loc[data.settings.scheme.name, ["single_low", "single_high", "percentile"]]
-    where = f"{len(names)} of {len(rows)} schemes{named}"
-    return {**mean_reduction(data, effect), **single, "where": where}
+    where = f"{len(names)} of {len(single)} schemes{named}"
+    own = single[data.settings.scheme.name]
+    return {**mean_reduction(data, effect), **own, "paper": paper, "where": where}
 
 
 def single_reductions(data: ClaimData, effect: str, scheme: str, paper: float) -> Numbers:
-    """Reductions, %, of the sd of an effect in single simulations.
+    """Reductions, %, of the sd of an effect in single simulations: median and central 95 %.
 
+    `percentile` is where the paper's number lies among them.
     The sd a posteriori of one calibration is its mean times σ̂0 over the mean of σ̂0, and the ratio
     of two independent σ̂0² of r degrees of freedom each has the F distribution.
     """
@@ -245,11 +226,8 @@ def single_reductions(data: ClaimData, effect: str, scheme: str, paper: float) -
     ratio = sds[1] / sds[0]
     ends = 100 * (1 - ratio * np.sqrt(special.fdtri(above, below, [0.975, 0.5, 0.025])))
     percentile = 100 * special.fdtrc(above, below, ((1 - paper / 100) / ratio) ** 2)
-    return {**_ends(ends), "percentile": float(percentile)}
-
-
-def _ends(values: Iterable[float]) -> Numbers:
-    return dict(zip(("single_low", "median", "single_high"), map(float, values), strict=True))
+    names = ("single_low", "median", "single_high", "percentile")
+    return dict(zip(names, map(float, [*ends, percentile]), strict=True))
 
 
 def pair_correlations(
@@ -279,9 +257,8 @@ def scale_pairs(data: ClaimData, approach: str, scheme: str = "") -> Array:
 
 def scale_correlation(data: ClaimData) -> Numbers:
     """Mean correlation of the scales, gravity-based, and its range over the schemes."""
-    means = data.single_simulations("scale-correlation-gravity")["mean"]
-    value = float(scale_pairs(data, "gravity").mean())
-    return {"value": value, "least": means.min(), "most": means.max()}
+    means = [float(scale_pairs(data, "gravity", scheme).mean()) for scheme in ("", *data.schemes)]
+    return {"value": means[0], "least": min(means), "most": max(means)}
 
 
 def scale_correlation_ratio(data: ClaimData) -> Numbers:

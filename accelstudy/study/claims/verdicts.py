@@ -36,15 +36,14 @@ def judge_claims(
     ----------
     study : Study, with `sensitivity`
     tables : paths of the tables of `TABLES`, by their names
-    outputs : paths of `claims`, `by_scheme` and `html`
+    outputs : paths of `claims` and `html`
     provenance : see `accelstudy.files.tables.origin`
     """
     data = ClaimData(study, {name: read_table(tables[name]) for name in TABLES})
     claims = judge(data)
     write_table(outputs["claims"], claims, provenance)
-    write_table(outputs["by_scheme"], data.by_scheme, provenance)
     with whole_file(outputs["html"]) as path:
-        path.write_text(claims_page(claims, data.by_scheme), encoding="utf-8")
+        path.write_text(claims_page(claims), encoding="utf-8")
 
 
 def judge(data: ClaimData) -> pd.DataFrame:
@@ -57,7 +56,7 @@ def judge(data: ClaimData) -> pd.DataFrame:
         ci95_low and ci95_high, verdict, sentence, and of single simulations single_low, single_high
         and percentile, NaN where they are not asked for.
     """
-    return pd.DataFrame([judge_claim(claim, data) for claim in claim_table()["paper"]])
+    return pd.DataFrame([judge_claim(claim, data) for claim in claim_table()])
 
 
 def judge_claim(claim: Mapping[str, Any], data: ClaimData) -> dict[str, Any]:
