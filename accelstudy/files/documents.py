@@ -2,28 +2,47 @@
 
 from __future__ import annotations
 
+import inspect
+import re
+from collections.abc import Mapping
 from pathlib import Path
-from typing import Annotated, ClassVar, Literal, Self
+from typing import Annotated, Any, ClassVar, Literal, Self
 
 from pydantic import BaseModel, ConfigDict
 
 from accelstudy.files.reading import read_json
 from accelstudy.files.validation import Number, validate
 
+ITEM = re.compile(r"^(\w+) : (.+(?:\n {4}.+)*)", re.MULTILINE)
+"""Name and meaning of an attribute in a docstring."""
+
 
 class Part(BaseModel):
-    """A part of a document; keys of later versions are kept as they are."""
+    """A part of a document; keys of later versions are kept as they are.
 
-    model_config = ConfigDict(extra="allow", use_attribute_docstrings=True)
+    What its docstring says of attributes describes the keys, on pages and in the JSON Schema.
+    """
+
+    model_config = ConfigDict(extra="allow")
+
+    @classmethod
+    def __pydantic_init_subclass__(cls, **settings: Any) -> None:
+        super().__pydantic_init_subclass__(**settings)
+        for name, meaning in ITEM.findall(inspect.cleandoc(cls.__doc__ or "")):
+            cls.model_fields[name].description = " ".join(meaning.split())
+        cls.model_rebuild(force=True)
 
 
 class Document(Part):
-    """The content of a JSON file of accelstudy."""
+    """The content of a JSON file of accelstudy, whose name is `file`.
+
+    Attributes
+    ----------
+    schema_version : of this format
+    """
 
     file: ClassVar[str]
-    """Name of the file in its folder."""
     schema_version: Annotated[Literal[1], Number]
-    """of this format"""
 
     @classmethod
     def read(cls, path: str | Path) -> Self:
@@ -39,7 +58,7 @@ class Document(Part):
         return cls.check(read_json(path, cls.refusal()), str(path))
 
     @classmethod
-    def check(cls, content: object, where: str = "") -> Self:
+    def check(cls, content: Mapping[str, Any], where: str = "") -> Self:
         """Check the content of such a file; `where` begins the message if it is something else."""
         return validate(cls, content, ": ".join(filter(None, [where, cls.refusal()])))
 

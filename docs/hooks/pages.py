@@ -13,12 +13,13 @@ import schemas
 from mkdocs.structure.files import File
 
 from accelstudy.campaign.calibration.file_format import CalibrationDocument
+from accelstudy.lots.file_format import LotDocument
 
 MODULES = {
     module.__name__: module
     for module in (catalogue, file_formats, gallery, help_texts, quotes, schemas)
 }
-DOCUMENTS = (CalibrationDocument,)
+DOCUMENTS = (CalibrationDocument, LotDocument)
 """Files whose JSON Schema can be downloaded."""
 CALL = re.compile(r"^<!-- (\w+)\.(\w+)\((.*)\) -->$", re.MULTILINE)
 

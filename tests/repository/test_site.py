@@ -23,6 +23,7 @@ from accelstudy.campaign.batch import COLUMNS, PARAMETERS
 from accelstudy.campaign.calibration.document import json_text
 from accelstudy.campaign.calibration.file_format import CalibrationDocument
 from accelstudy.lots.evidence import SensorEvidence
+from accelstudy.lots.file_format import LotDocument
 from accelstudy.lots.lot import LotDiagnosis
 from accelstudy.lots.mixture import LotTest
 from accelstudy.lots.output import Lot
@@ -82,13 +83,14 @@ def test_each_key_and_column_of_a_calibration_is_described(tmp_path):
     one, three = each[0], accelstudy.history(each, dates=dates)
     one.save(tmp_path / "one")
     three.save(tmp_path / "three")
-    schema = strict(CalibrationDocument.model_json_schema())
-    said = [error.message for error in Draft202012Validator(schema).iter_errors(one.content)]
-    assert said == []
+    lot = json.loads(json_text({**_lot(), "files": []}))
+    for document, content in ((CalibrationDocument, one.content), (LotDocument, lot)):
+        schema = Draft202012Validator(strict(document.model_json_schema()))
+        assert [error.message for error in schema.iter_errors(content)] == []
+        assert document.check(content).model_dump(exclude_unset=True, by_alias=True) == content
     written = {
         "comparison": accelstudy.compare(one, one).content,
         "history": three.content,
-        "lot": {**_lot(), "files": []},
     }
     for name, content in written.items():
         path = ROOT / f"docs/reference/{name}.schema.yaml"

@@ -50,247 +50,305 @@ Ends = Annotated[
 
 
 class Shown(Part):
-    """The same as people read it."""
+    """The same as people read it.
+
+    Attributes
+    ----------
+    value : estimate
+    sigma : its standard deviation
+    unit : unit, such as ppm or mgon
+    """
 
     value: float | None
-    """estimate"""
     sigma: float | None
-    """its standard deviation"""
     unit: str
-    """unit, such as ppm or mgon"""
 
 
 class Parameter(Part):
-    """A parameter."""
+    """A parameter.
+
+    Attributes
+    ----------
+    name : name
+    value : estimate
+    sigma : its standard deviation, as quoted
+    ci95 : half of its 95 % confidence interval
+    sigma_priori : by the stated noise
+    sigma_posteriori : by the residuals
+    unit : SI unit
+    """
 
     name: str
-    """name"""
     value: ParameterValue
-    """estimate"""
     sigma: ParameterSigma | None
-    """its standard deviation, as quoted"""
     ci95: float | None = None
-    """half of its 95 % confidence interval"""
     sigma_priori: float | None = None
-    """by the stated noise"""
     sigma_posteriori: float | None = None
-    """by the residuals"""
     unit: str
-    """SI unit"""
     shown: Shown | None = None
 
 
 class Reference(Part):
-    """The sensor that gave the angles."""
+    """The sensor that gave the angles.
+
+    Attributes
+    ----------
+    calibration : campaign of its calibration
+    frame : where its axes point in the axes of the sensor
+    sigma_mps2 : standard deviation of its mean in a hold, per axis
+    """
 
     calibration: str
-    """campaign of its calibration"""
     frame: str
-    """where its axes point in the axes of the sensor"""
     sigma_mps2: float
-    """standard deviation of its mean in a hold, per axis"""
 
 
 class Type(Part):
-    """The type of the sensor that was used as prior."""
+    """The type of the sensor that was used as prior.
+
+    Attributes
+    ----------
+    file : its file
+    sensors : number of sensors that it is estimated from
+    """
 
     file: str
-    """its file"""
     sensors: int
-    """number of sensors that it is estimated from"""
 
 
 class Affine(Part):
-    """The calibration as a matrix; null where the model is not linear in the force."""
+    """The calibration as a matrix; null where the model is not linear in the force.
+
+    Attributes
+    ----------
+    matrix : K of f = K (reading − b)
+    bias_mps2 : b of the same
+    """
 
     matrix: Matrix
-    """K of f = K (reading − b)"""
     bias_mps2: list[float | None]
-    """b of the same"""
 
 
 class Correction(Part):
-    """A gross error that a diagnosis corrected."""
+    """A gross error that a diagnosis corrected.
+
+    Attributes
+    ----------
+    error : its name with its settings
+    reason : how it was recognised
+    matrix : turns forces as they are read into those that were fitted
+    """
 
     error: str
-    """its name with its settings"""
     reason: str
-    """how it was recognised"""
     matrix: Regular | None
-    """turns forces as they are read into those that were fitted"""
 
 
 class GrossError(Part):
-    """A gross error that was recognised."""
+    """A gross error that was recognised.
+
+    Attributes
+    ----------
+    name : its name with its settings
+    reason : how
+    """
 
     name: str
-    """its name with its settings"""
     reason: str
-    """how"""
 
 
 class GlobalTest(Part):
-    """Test of the residuals against the stated noise."""
+    """Test of the residuals against the stated noise.
+
+    Attributes
+    ----------
+    statistic : weighted sum of squared residuals
+    dof : redundancy, its degrees of freedom
+    sigma_dof : those of the stated noise; null if it is known
+    p_value : two-sided
+    accepted : at 1 %
+    remark : why the test has no power; empty if it has
+    """
 
     statistic: float
-    """weighted sum of squared residuals"""
     dof: int
-    """redundancy, its degrees of freedom"""
     sigma_dof: float | None = None
-    """those of the stated noise; null if it is known"""
     p_value: float
-    """two-sided"""
     accepted: bool
-    """at 1 %"""
     remark: str = ""
-    """why the test has no power; empty if it has"""
 
 
 class Suspect(Part):
-    """An outlier."""
+    """An outlier.
+
+    Attributes
+    ----------
+    position : number of the hold
+    p_value : for all positions together
+    """
 
     position: int
-    """number of the hold"""
     p_value: float
-    """for all positions together"""
 
 
 class HeldOut(Part):
-    """Errors of positions that the fit to the others predicts."""
+    """Errors of positions that the fit to the others predicts.
+
+    Attributes
+    ----------
+    n_predicted : number of these positions
+    rms_mps2 : of the forces
+    rms_roll_mgon : of roll, with a robot
+    rms_pitch_mgon : and of pitch
+    """
 
     n_predicted: int
-    """number of these positions"""
     rms_mps2: float | None
-    """of the forces"""
     rms_roll_mgon: float | None = None
-    """of roll, with a robot"""
     rms_pitch_mgon: float | None = None
-    """and of pitch"""
 
 
 class VarianceComponents(Part):
-    """Factors on the stated variances, with a robot."""
+    """Factors on the stated variances, with a robot.
+
+    Attributes
+    ----------
+    accelerometer : of the forces
+    robot : of the angles
+    sigma : their standard deviations
+    converged : whether the estimation converged
+    """
 
     accelerometer: float
-    """of the forces"""
     robot: float
-    """of the angles"""
     sigma: list[float | None]
-    """their standard deviations"""
     converged: bool
-    """whether the estimation converged"""
 
 
 class Tilt(Part):
-    """Tilt error that is left, rms."""
+    """Tilt error that is left, rms.
+
+    Attributes
+    ----------
+    roll : all of it
+    pitch : all of it
+    parameters_roll : by the uncertainty of the parameters
+    parameters_pitch : by the uncertainty of the parameters
+    reference_roll : by the calibration of a reference
+    reference_pitch : by the calibration of a reference
+    max_tilt_gon : tilts that it is taken over
+    """
 
     roll: float | None
-    """all of it"""
     pitch: float | None
-    """all of it"""
     parameters_roll: float | None = None
-    """by the uncertainty of the parameters"""
     parameters_pitch: float | None = None
-    """by the uncertainty of the parameters"""
     reference_roll: float | None = None
-    """by the calibration of a reference"""
     reference_pitch: float | None = None
-    """by the calibration of a reference"""
     max_tilt_gon: float
-    """tilts that it is taken over"""
 
 
 class Quality(Part):
-    """How good the calibration is."""
+    """How good the calibration is.
+
+    Attributes
+    ----------
+    state : the verdict: accepted, rejected, cannot tell or implausible
+    plausible : whether nothing looks like a gross error
+    warnings : what does
+    verdict : in words
+    suspects : outliers, positions in conflict with the others
+    """
 
     state: str = ""
-    """the verdict: accepted, rejected, cannot tell or implausible"""
     plausible: bool = True
-    """whether nothing looks like a gross error"""
     warnings: list[str] = Field([])
-    """what does"""
     gross_error: GrossError | None = None
     verdict: str = ""
-    """in words"""
     global_test: GlobalTest | None = None
     suspects: list[Suspect] = Field([])
-    """outliers, positions in conflict with the others"""
     held_out: HeldOut | None = None
     variance_components: VarianceComponents | None = None
     tilt_rms_mgon: Tilt | None = None
 
 
 class CalibrationDocument(Document):
-    """A calibration; `accelstudy apply` and `export` read it."""
+    """A calibration; `accelstudy apply` and `export` read it.
+
+    Attributes
+    ----------
+    campaign : name of the campaign
+    sensor : what was calibrated
+    date : when it was measured, ISO 8601
+    model : name of the model
+    effects : effects of the model, with their settings
+    approach : whether angles were used: gravity or robot
+    axes : axes of the parameters: forward, right, down
+    unit : of the readings
+    gravity_mps2 : local gravity
+    n_positions : positions that were fitted
+    sigma_source : whether sigmas are quoted by the stated noise or by the residuals
+    sigma_dof : degrees of freedom of the noise in the quoted sigmas; null if it is known
+    sigmas_95 : number of quoted sigmas that hold 95 %: 1.96 of a known noise, else by Student's
+        t
+    sigma_position_mps2 : noise of a position mean, as quoted
+    sigma_position_priori_mps2 : the same, as stated in the header
+    sigma_position_posteriori_mps2 : the same, from the residuals
+    sigma_position_axes_mps2 : the same of x, y and z, only where a diagnosis found that they
+        differ
+    sigma_reading_mps2 : noise of a single reading, from the samples within the holds
+    parameters : in SI
+    covariance : covariance matrix of the parameters, as quoted
+    correlation : correlation matrix
+    condition : condition of the scaled design; 1 is ideal
+    redundancy : conditions minus unknowns
+    variance_of_unit_weight : a posteriori; 1 if the noise is as stated
+    iterations : iterations of the adjustment
+    rms_norm_residual_mps2 : rms of |f| − g
+    excluded : positions that were left out
+    range_mps2 : the sensor measures ± this
+    ranges : smallest and largest force, time, temperature and vibration in the campaign
+    log : how the log was read, as in the header of the campaign
+    warnings : of the reading of the campaign
+    """
 
     file = "calibration.json"
     campaign: str
-    """name of the campaign"""
     sensor: str | None = None
-    """what was calibrated"""
     date: str | None = None
-    """when it was measured, ISO 8601"""
     model: str
-    """name of the model"""
     effects: Annotated[list[str], Field(min_length=1)]
-    """effects of the model, with their settings"""
     approach: str = ""
-    """whether angles were used: gravity or robot"""
     reference: Reference | None = None
     type: Type | None = None
     axes: Literal["frd"] = "frd"
-    """axes of the parameters: forward, right, down"""
     unit: Literal["m/s^2", "g", "mg", "counts"]
-    """of the readings"""
     nominal: Nominal | None
     gravity_mps2: Gravity
-    """local gravity"""
     n_positions: Annotated[int, *bounds_of(bounds.POSITIONS)] | None = None
-    """positions that were fitted"""
     sigma_source: Literal["a priori", "a posteriori"] = "a posteriori"
-    """whether sigmas are quoted by the stated noise or by the residuals"""
     sigma_dof: Annotated[float, *bounds_of(REDUNDANCY)] | None = None
-    """degrees of freedom of the noise in the quoted sigmas; null if it is known"""
     sigmas_95: ParameterSigma | None = None
-    """number of quoted sigmas that hold 95 %: 1.96 of a known noise, else by Student's t"""
     sigma_position_mps2: ParameterSigma | None
-    """noise of a position mean, as quoted"""
     sigma_position_priori_mps2: float | None = None
-    """the same, as stated in the header"""
     sigma_position_posteriori_mps2: float | None = None
-    """the same, from the residuals"""
     sigma_position_axes_mps2: list[float] | None = None
-    """the same of x, y and z, only where a diagnosis found that they differ"""
     sigma_reading_mps2: ParameterSigma | None = None
-    """noise of a single reading, from the samples within the holds"""
     parameters: list[Parameter]
-    """in SI"""
     covariance: list[list[Annotated[float, *bounds_of(VARIANCE)] | None]]
-    """covariance matrix of the parameters, as quoted"""
     correlation: Matrix | None = None
-    """correlation matrix"""
     condition: float | None = None
-    """condition of the scaled design; 1 is ideal"""
     redundancy: Annotated[int, *bounds_of(REDUNDANCY)] = 0
-    """conditions minus unknowns"""
     variance_of_unit_weight: float | None = None
-    """a posteriori; 1 if the noise is as stated"""
     iterations: int | None = None
-    """iterations of the adjustment"""
     rms_norm_residual_mps2: float | None = None
-    """rms of |f| − g"""
     affine: Affine | None = None
     mended: Correction | None = None
     excluded: list[Exclusion] = Field([])
-    """positions that were left out"""
     range_mps2: ParameterSigma | None = None
-    """the sensor measures ± this"""
     ranges: dict[str, Ends] = Field({})
-    """smallest and largest force, time, temperature and vibration in the campaign"""
     log: LogLayout | None = None
-    """how the log was read, as in the header of the campaign"""
     warnings: list[str] = Field([])
-    """of the reading of the campaign"""
     quality: Quality = Quality()
 
     @model_validator(mode="after")
