@@ -152,8 +152,8 @@ def _turned(code: Code, a: Term, quarters: int) -> Term:
 
     turns = count + float(quarters)
     pairs = code.intrinsic("floor", turns * 0.5)
-    odd = code.compare("one", turns, pairs * 2.0)
-    negative = code.compare("one", pairs, code.intrinsic("floor", pairs * 0.5) * 2.0)
+    odd = code.compare("!=", turns, pairs * 2.0)
+    negative = code.compare("!=", pairs, code.intrinsic("floor", pairs * 0.5) * 2.0)
     value = odd.select(cosine, sine)
     return negative.select(-value, value)
 
@@ -170,16 +170,16 @@ def _tangent(code: Code, a: Term) -> Term:
 
 
 def _sign(code: Code, a: Term) -> Term:
-    return _above(code, a).select(1.0, code.compare("olt", a, 0.0).select(-1.0, a))
+    return _above(code, a).select(1.0, code.compare("<", a, 0.0).select(-1.0, a))
 
 
 def _step(code: Code, a: Term, at_zero: Term = 0.5) -> Term:
-    zero = code.compare("oeq", a, 0.0).select(at_zero, a)
-    return _above(code, a).select(1.0, code.compare("olt", a, 0.0).select(0.0, zero))
+    zero = code.compare("==", a, 0.0).select(at_zero, a)
+    return _above(code, a).select(1.0, code.compare("<", a, 0.0).select(0.0, zero))
 
 
 def _above(code: Code, a: Term) -> Mask:
-    return code.compare("ogt", a, 0.0)
+    return code.compare(">", a, 0.0)
 
 
 def _extreme(name: str) -> Callable[..., Term]:

@@ -1,7 +1,7 @@
 """Arithmetic on lanes: as many replicates side by side as a vector has places.
 
-The operations on `Lanes` write LLVM's text instead of computing. So formulas in ordinary Python
-become text that is compiled afterwards. A plain number is a constant in all lanes; structural zeros
+The operations on `Lanes` write code of LLVM instead of computing. So formulas in ordinary Python
+become code that is compiled afterwards. A plain number is a constant in all lanes; structural zeros
 and ones cost nothing. The lanes are independent, and every operation is rounded by IEEE 754 (no
 fused multiply-adds but those that are written). So a result depends neither on the other lanes nor
 on the processor.
@@ -10,16 +10,16 @@ on the processor.
 from __future__ import annotations
 
 import math
-import struct
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
-from typing import TypeAlias
+from typing import Any, TypeAlias
+
+from llvmlite import ir
 
 LANES = 8
-_VECTOR = f"<{LANES} x double>"
-_MASK = f"<{LANES} x i1>"
-_INTRINSIC = f"v{LANES}f64"
+_NUMBER, _INTEGER = ir.DoubleType(), ir.IntType(64)
+_VECTOR, _MASK = ir.VectorType(_NUMBER, LANES), ir.VectorType(ir.IntType(1), LANES)
 
 
 @dataclass(frozen=True, eq=False)
@@ -27,7 +27,7 @@ class Lanes:
     """A number in each lane."""
 
     code: Code
-    name: str
+    value: Any
 
     def __add__(self, other: Term) -> Lanes:
         return self if _is(other, 0) else self.code.binary("fadd", self, other)
@@ -56,10 +56,10 @@ class Lanes:
         return self.code.binary("fdiv", other, self)
 
     def __neg__(self) -> Lanes:
-        return Lanes(self.code, self.code.line(f"fneg {_VECTOR} {self.name}"))
+        return Lanes(self.code, self.code.builder.fneg(self.value))
 
     def __gt__(self, other: Term) -> Mask:
-        return self.code.compare("ogt", self, other)
+        return self.code.compare(">", self, other)
 
 
 @dataclass(frozen=True, eq=False)
@@ -67,23 +67,22 @@ class Mask:
     """Yes or no in each lane."""
 
     code: Code
-    name: str
+    value: Any
 
     def __and__(self, other: Mask) -> Mask:
-        return Mask(self.code, self.code.line(f"and {_MASK} {self.name}, {other.name}"))
+        return Mask(self.code, self.code.builder.and_(self.value, other.value))
 
     def __invert__(self) -> Mask:
-        return Mask(self.code, self.code.line(f"xor {_MASK} {self.name}, splat (i1 true)"))
+        return Mask(self.code, self.code.builder.xor(self.value, ir.Constant(_MASK, [1] * LANES)))
 
     def select(self, yes: Term, no: Term) -> Lanes:
         """`yes` in the lanes of the mask, `no` in the others."""
-        operands = f"{_VECTOR} {text(yes)}, {_VECTOR} {text(no)}"
-        return Lanes(self.code, self.code.line(f"select {_MASK} {self.name}, {operands}"))
+        return Lanes(self.code, self.code.builder.select(self.value, operand(yes), operand(no)))
 
-    def any(self) -> str:
+    def any(self) -> Any:
         """Whether the mask is set in any lane, as one bit."""
-        bits = self.code.line(f"bitcast {_MASK} {self.name} to i{LANES}")
-        return self.code.line(f"icmp ne i{LANES} {bits}, 0")
+        bits = self.code.builder.bitcast(self.value, ir.IntType(LANES))
+        return self.code.builder.icmp_unsigned("!=", bits, bits.type(0))
 
 
 Term: TypeAlias = Lanes | float
@@ -99,15 +98,15 @@ class Variable:
 
     def get(self) -> Lanes:
         """Present value."""
-        return Lanes(self._code, self._code.line(f"load {_VECTOR}, ptr {self._place}"))
+        return Lanes(self._code, self._code.builder.load(self._place))
 
     def set(self, value: Term) -> None:
         """Replace the value."""
-        self._code.do(f"store {_VECTOR} {text(value)}, ptr {self._place}")
+        self._code.builder.store(operand(value), self._place)
 
 
 class Code:
-    """The text of one function, written line by line.
+    """The code of one function; what its methods write comes after what they wrote before.
 
     Parameters
     ----------
@@ -116,156 +115,128 @@ class Code:
     """
 
     def __init__(self, name: str, integers: Sequence[str], pointers: Sequence[str]) -> None:
-        arguments = [f"i64 %{a}" for a in integers] + [f"ptr noalias %{a}" for a in pointers]
-        self._head = f"define void @{name}({', '.join(arguments)}) {{\nentry:"
-        self._places: list[str] = []
-        self._lines: list[str] = []
-        self._declared: set[str] = set()
-        self._count = 0
-        self._exits: list[str] = []
+        kinds = [_INTEGER] * len(integers) + [_NUMBER.as_pointer()] * len(pointers)
+        self._module = ir.Module()
+        function = ir.Function(self._module, ir.FunctionType(ir.VoidType(), kinds), name)
+        self.arguments = dict(zip([*integers, *pointers], function.args, strict=True))
+        for pointer in pointers:
+            self.arguments[pointer].add_attribute("noalias")
+        self.builder = ir.IRBuilder(function.append_basic_block("entry"))
+        self._exits: list[Any] = []
 
-    def __str__(self) -> str:
-        body = "\n".join([*self._places, *self._lines])
-        declarations = "\n".join(sorted(self._declared))
-        return f"{self._head}\n{body}\n  ret void\n}}\n{declarations}\n"
+    def text(self) -> str:
+        """End the function, and return it as LLVM reads it."""
+        self.builder.ret_void()
+        return "".join(str(function) + "\n" for function in self._module.functions)
 
-    def _new(self, prefix: str = "v") -> str:
-        self._count += 1
-        return f"{prefix}{self._count}"
-
-    def do(self, line: str) -> None:
-        """Write an instruction without a result."""
-        self._lines.append("  " + line)
-
-    def line(self, line: str) -> str:
-        """Write an instruction and name its result."""
-        name = "%" + self._new()
-        self._lines.append(f"  {name} = {line}")
-        return name
-
-    def place(self, kind: str) -> str:
+    def place(self, kind: Any) -> Any:
         """Memory of the function for one value of a kind."""
-        name = "%" + self._new("m")
-        self._places.append(f"  {name} = alloca {kind}")
-        return name
+        with self.builder.goto_entry_block():
+            return self.builder.alloca(kind)
 
     def binary(self, operation: str, a: Term, b: Term) -> Lanes:
         """Write an operation of two numbers."""
-        return Lanes(self, self.line(f"{operation} {_VECTOR} {text(a)}, {text(b)}"))
+        return Lanes(self, getattr(self.builder, operation)(operand(a), operand(b)))
 
     def compare(self, how: str, a: Term, b: Term) -> Mask:
-        """Write a comparison."""
-        return Mask(self, self.line(f"fcmp {how} {_VECTOR} {text(a)}, {text(b)}"))
+        """Write a comparison, which is false of NaN."""
+        return Mask(self, self.builder.fcmp_ordered(how, operand(a), operand(b)))
 
     def intrinsic(self, name: str, *arguments: Term) -> Lanes:
         """Write an operation that LLVM knows by name."""
-        function = f"@llvm.{name}.{_INTRINSIC}"
-        kinds = ", ".join([_VECTOR] * len(arguments))
-        self._declared.add(f"declare {_VECTOR} {function}({kinds})")
-        operands = ", ".join(f"{_VECTOR} {text(a)}" for a in arguments)
-        return Lanes(self, self.line(f"call {_VECTOR} {function}({operands})"))
+        return Lanes(self, self._call(f"llvm.{name}.v{LANES}f64", _VECTOR, map(operand, arguments)))
 
     def library(self, name: str, *arguments: Term) -> Lanes:
         """Call a function of the C library, lane by lane."""
-        self._declared.add(f"declare double @{name}({', '.join(['double'] * len(arguments))})")
-        result = "poison"
+        values = []
         for lane in range(LANES):
-            taken = [
-                self.line(f"extractelement {_VECTOR} {text(a)}, i64 {lane}") for a in arguments
-            ]
-            value = self.line(f"call double @{name}({', '.join(f'double {t}' for t in taken)})")
-            result = self.line(f"insertelement {_VECTOR} {result}, double {value}, i64 {lane}")
+            of_lane = (self.builder.extract_element(operand(a), _INTEGER(lane)) for a in arguments)
+            values.append(self._call(name, _NUMBER, of_lane))
+        return self._together(values)
+
+    def _call(self, name: str, kind: Any, arguments: Any) -> Any:
+        given = [*arguments]
+        function = self._module.globals.get(name) or ir.Function(
+            self._module, ir.FunctionType(kind, [kind] * len(given)), name
+        )
+        return self.builder.call(function, given)
+
+    def _together(self, values: Sequence[Any]) -> Lanes:
+        """Numbers of the lanes as one; a single one is that of all."""
+        result = ir.Constant(_VECTOR, ir.Undefined)
+        for lane, value in enumerate(values):
+            result = self.builder.insert_element(result, value, _INTEGER(lane))
+        if len(values) == 1:
+            first = ir.Constant(ir.VectorType(ir.IntType(32), LANES), [0] * LANES)
+            result = self.builder.shuffle_vector(result, result, first)
         return Lanes(self, result)
 
     @contextmanager
-    def loop(self, count: str) -> Iterator[str]:
+    def loop(self, count: Any) -> Iterator[Any]:
         """Write a loop over an index from 0 to below `count`."""
-        counter = self.place("i64")
-        head, body, after = (self._new(part) for part in ("head", "body", "after"))
-        self.do(f"store i64 0, ptr {counter}")
-        self.do(f"br label %{head}")
-        self._lines.append(f"{head}:")
-        index = self.line(f"load i64, ptr {counter}")
-        going = self.line(f"icmp slt i64 {index}, {count}")
-        self.do(f"br i1 {going}, label %{body}, label %{after}")
-        self._lines.append(f"{body}:")
+        builder, counter = self.builder, self.place(_INTEGER)
+        head, body, after = (builder.append_basic_block(name) for name in ("head", "body", "after"))
+        builder.store(_INTEGER(0), counter)
+        builder.branch(head)
+        builder.position_at_end(head)
+        index = builder.load(counter)
+        builder.cbranch(builder.icmp_signed("<", index, _integer(count)), body, after)
+        builder.position_at_end(body)
         self._exits.append(after)
         yield index
         self._exits.pop()
-        following = self.line(f"add i64 {index}, 1")
-        self.do(f"store i64 {following}, ptr {counter}")
-        self.do(f"br label %{head}")
-        self._lines.append(f"{after}:")
+        builder.store(self.integer("add", index, 1), counter)
+        builder.branch(head)
+        builder.position_at_end(after)
 
-    def leave_unless(self, bit: str) -> None:
+    def leave_unless(self, bit: Any) -> None:
         """Leave the innermost loop unless a bit is set."""
-        on = self._new("on")
-        self.do(f"br i1 {bit}, label %{on}, label %{self._exits[-1]}")
-        self._lines.append(f"{on}:")
+        on = self.builder.append_basic_block("on")
+        self.builder.cbranch(bit, on, self._exits[-1])
+        self.builder.position_at_end(on)
 
-    @contextmanager
-    def when(self, bit: str) -> Iterator[None]:
-        """Write instructions that are run only if a bit is set."""
-        then, after = self._new("then"), self._new("after")
-        self.do(f"br i1 {bit}, label %{then}, label %{after}")
-        self._lines.append(f"{then}:")
-        yield
-        self.do(f"br label %{after}")
-        self._lines.append(f"{after}:")
-
-    def integer(self, operation: str, a: str | int, b: str | int) -> str:
+    def integer(self, operation: str, a: Any, b: Any) -> Any:
         """Write an operation of two integers."""
-        return self.line(f"{operation} i64 {a}, {b}")
+        return getattr(self.builder, operation)(_integer(a), _integer(b))
 
-    def smaller(self, a: str, b: str) -> str:
+    def smaller(self, a: Any, b: Any) -> Any:
         """Return the smaller of two integers."""
-        return self.line(f"select i1 {self.line(f'icmp slt i64 {a}, {b}')}, i64 {a}, i64 {b}")
+        return self.builder.select(self.builder.icmp_signed("<", a, b), a, b)
 
-    def _at(self, pointer: str, offset: str) -> str:
-        return self.line(f"getelementptr inbounds double, ptr %{pointer}, i64 {offset}")
+    def _at(self, pointer: str, offset: Any) -> Any:
+        return self.builder.gep(self.arguments[pointer], [_integer(offset)], inbounds=True)
 
-    def load(self, pointer: str, offset: str) -> Lanes:
+    def load(self, pointer: str, offset: Any) -> Lanes:
         """Load a number for each lane from consecutive places."""
-        return Lanes(self, self.line(f"load {_VECTOR}, ptr {self._at(pointer, offset)}, align 8"))
+        place = self.builder.bitcast(self._at(pointer, offset), _VECTOR.as_pointer())
+        return Lanes(self, self.builder.load(place, align=8))
 
-    def store(self, value: Term, pointer: str, offset: str) -> None:
+    def store(self, value: Term, pointer: str, offset: Any) -> None:
         """Store the numbers of all lanes in consecutive places."""
-        self.do(f"store {_VECTOR} {text(value)}, ptr {self._at(pointer, offset)}, align 8")
+        place = self.builder.bitcast(self._at(pointer, offset), _VECTOR.as_pointer())
+        self.builder.store(operand(value), place, align=8)
 
-    def load_same(self, pointer: str, offset: str) -> Lanes:
-        """Load one number for all lanes."""
-        return self.load_each(pointer, [offset])
-
-    def load_each(self, pointer: str, offsets: Sequence[str]) -> Lanes:
-        """Load a number for each lane, from an offset of its own."""
-        result = "poison"
-        for lane, offset in enumerate(offsets):
-            value = self.line(f"load double, ptr {self._at(pointer, offset)}, align 8")
-            result = self.line(f"insertelement {_VECTOR} {result}, double {value}, i64 {lane}")
-        return self._alike(result) if len(offsets) == 1 else Lanes(self, result)
-
-    def _alike(self, first: str) -> Lanes:
-        """The number of the first lane in all lanes."""
-        zero = f"<{LANES} x i32> zeroinitializer"
-        return Lanes(self, self.line(f"shufflevector {_VECTOR} {first}, {_VECTOR} poison, {zero}"))
+    def load_each(self, pointer: str, offsets: Sequence[Any]) -> Lanes:
+        """Load a number for each lane, from an offset of its own, or the same one for all."""
+        places = (self._at(pointer, offset) for offset in offsets)
+        return self._together([self.builder.load(place, align=8) for place in places])
 
     def lane_numbers(self) -> Lanes:
         """0, 1, 2, … in the lanes."""
-        return Lanes(self, f"<{', '.join(f'double {_bits(float(i))}' for i in range(LANES))}>")
+        return Lanes(self, ir.Constant(_VECTOR, [float(lane) for lane in range(LANES)]))
 
-    def of_integer(self, value: str) -> Lanes:
+    def of_integer(self, value: Any) -> Lanes:
         """Return an integer as the number of all lanes."""
-        one = self.line(f"sitofp i64 {value} to double")
-        return self._alike(self.line(f"insertelement {_VECTOR} poison, double {one}, i64 0"))
+        return self._together([self.builder.sitofp(value, _NUMBER)])
 
 
-def text(value: Term) -> str:
-    """Return an operand as LLVM reads it."""
-    return value.name if isinstance(value, Lanes) else f"splat (double {_bits(value)})"
+def operand(value: Term) -> Any:
+    """Return a number of all lanes as LLVM knows it."""
+    return value.value if isinstance(value, Lanes) else ir.Constant(_VECTOR, [value] * LANES)
 
 
-def _bits(value: float) -> str:
-    return f"0x{struct.unpack('<Q', struct.pack('<d', value))[0]:016X}"
+def _integer(value: Any) -> Any:
+    return _INTEGER(value) if isinstance(value, int) else value
 
 
 def _is(value: Term, number: float) -> bool:
@@ -294,7 +265,7 @@ def larger(a: Term, b: Term) -> Term:
     """Return the larger of two numbers, and `b` where either is NaN."""
     if isinstance(a, Lanes):
         return (a > b).select(a, b)
-    return b.code.compare("ogt", a, b).select(a, b) if isinstance(b, Lanes) else max(a, b)
+    return b.code.compare(">", a, b).select(a, b) if isinstance(b, Lanes) else max(a, b)
 
 
 def above(a: Term, least: float) -> Term:

@@ -136,7 +136,7 @@ Rows: TypeAlias = list[list[Term]]
 
 def text_of(function: KernelFunction) -> str:
     """Write the function as LLVM's text, which is kept."""
-    return kept_under(function.key, "kernel", lambda: str(_Writer(function).code))
+    return kept_under(function.key, "kernel", lambda: _Writer(function).code.text())
 
 
 class _Writer:
@@ -151,36 +151,36 @@ class _Writer:
         self.code = code = Code(NAME, INTEGERS, POINTERS)
         self.stored: Rows = []
 
-        padded = code.integer("add", "%replicates", LANES - 1)
+        padded = code.integer("add", code.arguments["replicates"], LANES - 1)
         groups = code.integer("sdiv", padded, LANES)
         self.stride = code.integer("mul", groups, LANES)
-        self.weights = {k: code.load_same("weights", str(k)) for k in self.weighted}
+        self.weights = {k: code.load_each("weights", [k]) for k in self.weighted}
         with code.loop(groups) as group:
             self.group(code.integer("mul", group, LANES))
 
     # Memory ------------------------------------------------------------------------------------
 
-    def known(self, i: str, column: int) -> Lanes:
+    def known(self, i: Any, column: int) -> Lanes:
         row = self.code.integer("mul", i, self.of.columns)
-        return self.code.load_same("known", self.code.integer("add", row, column))
+        return self.code.load_each("known", [self.code.integer("add", row, column)])
 
-    def slot(self, i: str, vector: int) -> str:
+    def slot(self, i: Any, vector: int) -> Any:
         """Offset of a vector of a position in `work`."""
         row = self.code.integer("mul", i, self.of.work * LANES)
         return self.code.integer("add", row, vector * LANES)
 
-    def read(self, i: str, first: int, count: int) -> list[Lanes]:
+    def read(self, i: Any, first: int, count: int) -> list[Lanes]:
         return [self.code.load("work", self.slot(i, first + k)) for k in range(count)]
 
-    def write(self, i: str, first: int, values: list[Term]) -> None:
+    def write(self, i: Any, first: int, values: list[Term]) -> None:
         for k, value in enumerate(values):
             self.code.store(value, "work", self.slot(i, first + k))
 
     # A group of replicates -----------------------------------------------------------------------
 
-    def group(self, first: str) -> None:
+    def group(self, first: Any) -> None:
         code, u = self.code, self.u
-        last = code.integer("sub", "%replicates", 1)
+        last = code.integer("sub", code.arguments["replicates"], 1)
         # The lanes beyond the last replicate repeat it.
         rows = [code.smaller(code.integer("add", first, lane), last) for lane in range(LANES)]
         tolerance = self.observe(rows)
@@ -193,31 +193,30 @@ class _Writer:
         kept = _Kept.of(code, u)
         numbers = code.of_integer(first) + code.lane_numbers()
         active = Variable(code, 1.0)
-        with code.loop(str(MAX_ITERATIONS)) as iteration:
+        with code.loop(MAX_ITERATIONS) as iteration:
             step = self.step(x, initial)
             going = active.get() > 0.0
             converged = going & step.within(code, tolerance)
             number = code.of_integer(code.integer("add", iteration, 1))
             kept.iterations.set(going.select(number, kept.iterations.get()))
-            with code.when(converged.any()):
+            with code.builder.if_then(converged.any()):
                 kept.keep(converged, step, x)
             still = going & step.finite(code) & ~converged
             active.set(still.select(1.0, 0.0))
             code.leave_unless(still.any())
-        self.results(first, kept, numbers < code.of_integer("%replicates"))
+        self.results(first, kept, numbers < code.of_integer(code.arguments["replicates"]))
 
-    def observe(self, rows: list[str]) -> Term:
+    def observe(self, rows: list[Any]) -> Term:
         """Take the observations into `work`; returns the tolerance of the step."""
         code, o = self.code, self.o
         largest = Variable(code, 0.0)
         widths = {"forces": 3, "angles": 2} if o > 3 else {"forces": 3}
+        positions = code.arguments["positions"]
         starts = {
-            width: [
-                code.integer("mul", row, code.integer("mul", "%positions", width)) for row in rows
-            ]
+            width: [code.integer("mul", row, code.integer("mul", positions, width)) for row in rows]
             for width in widths.values()
         }
-        with code.loop("%positions") as i:
+        with code.loop(code.arguments["positions"]) as i:
             values: list[Term] = []
             for pointer, width in widths.items():
                 for k in range(width):
@@ -241,7 +240,7 @@ class _Writer:
         normal = {(i, j): Variable(code, 0.0) for i in range(u) for j in range(i + 1)}
         right = [Variable(code, 0.0) for _ in range(u)]
         size_psi, size_v, omega = (Variable(code, 0.0) for _ in range(3))
-        with code.loop("%positions") as i:
+        with code.loop(code.arguments["positions"]) as i:
             self.condition(i, at, normal, right, size_psi)
 
         n = {key: variable.get() for key, variable in normal.items()}
@@ -259,7 +258,7 @@ class _Writer:
         half = forward(lower, pivots, [r[k] * unit[k] for k in range(u)])
         dx = [d * s for d, s in zip(backward(lower, pivots, half), unit, strict=True)]
 
-        with code.loop("%positions") as i:
+        with code.loop(code.arguments["positions"]) as i:
             self.residuals(i, dx, size_v, omega)
         total: Term = omega.get()
         for k, weight in self.weights.items():
@@ -272,7 +271,7 @@ class _Writer:
 
     def condition(
         self,
-        i: str,
+        i: Any,
         x: list[Lanes],
         normal: dict[tuple[int, int], Variable],
         right: list[Variable],
@@ -334,13 +333,13 @@ class _Writer:
                 self.write(i, 2 * o + len(self.of.latent) + number, [value])
 
     def evaluate(
-        self, formulas: Formulas, table: dict[Any, Term], i: str, column: int
+        self, formulas: Formulas, table: dict[Any, Term], i: Any, column: int
     ) -> list[Term]:
         """Write formulas at a position, whose known numbers begin at a column."""
         known = {symbol: self.known(i, column + k) for k, symbol in enumerate(formulas.known)}
         return formulas.write(self.code, {**table, **known})
 
-    def residuals(self, i: str, dx: list[Term], size_v: Variable, omega: Variable) -> None:
+    def residuals(self, i: Any, dx: list[Term], size_v: Variable, omega: Variable) -> None:
         """Residuals of a position after a step, v = −(B Q)ᵀ L⁻ᵀ (A dx + w)."""
         u, o = self.u, self.o
         number = 2 * o + len(self.of.latent)
@@ -366,7 +365,7 @@ class _Writer:
         size_v.set(size)
         self.write(i, o, v_new)
 
-    def results(self, first: str, kept: _Kept, valid: Mask) -> None:
+    def results(self, first: Any, kept: _Kept, valid: Mask) -> None:
         """Write the results of a group."""
         code, u = self.code, self.u
         lower: Rows = [[variable.get() for variable in row] for row in kept.lower]
@@ -385,7 +384,7 @@ class _Writer:
         pairs = [(j, k) for j in range(u) for k in range(j)]
         for number, (j, k) in enumerate(pairs):
             correlation = q[j, k] * reciprocal[j] * reciprocal[k]
-            at = str(number * LANES)
+            at = number * LANES
             before = code.load("correlations", at)
             code.store(before + counted.select(correlation, 0.0), "correlations", at)
 
@@ -401,11 +400,11 @@ class _Step:
     sizes: tuple[Term, Lanes, Lanes]
 
     def within(self, code: Code, tolerance: Term) -> Mask:
-        x, v, psi = (code.compare("ole", size, tolerance) for size in self.sizes)
+        x, v, psi = (code.compare("<=", size, tolerance) for size in self.sizes)
         return x & v & psi
 
     def finite(self, code: Code) -> Mask:
-        x, v, psi = (code.compare("olt", size, math.inf) for size in self.sizes)
+        x, v, psi = (code.compare("<", size, math.inf) for size in self.sizes)
         return x & v & psi
 
 

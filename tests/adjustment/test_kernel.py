@@ -137,12 +137,12 @@ def test_the_formulas_of_every_effect(approach):
         formulas = Formulas(list(traced.expressions), frozenset())
         code = Code("f", (), ("x", "y"))
         table = {
-            symbol: code.load("x", str(k * LANES)) for k, symbol in enumerate(traced.arguments)
+            symbol: code.load("x", k * LANES) for k, symbol in enumerate(traced.arguments)
         }
         for k, value in enumerate(formulas.write(code, table)):
-            code.store(value, "y", str(k * LANES))
+            code.store(value, "y", k * LANES)
         result = np.empty((len(traced.expressions), LANES))
-        calibrate.Compiled(str(code), "f", 0, 2).call(values.ctypes.data, result.ctypes.data)
+        calibrate.Compiled(code.text(), "f", 0, 2).call(values.ctypes.data, result.ctypes.data)
         expected = traced((LANES,), *values).reshape(result.shape)
         assert result == pytest.approx(expected, rel=1e-11, abs=1e-11)
 
@@ -152,10 +152,10 @@ def test_what_is_compiled_is_compiled_once(monkeypatch):
     monkeypatch.setattr(calibrate, "_compiled", lambda *a: made.append(1) or make(*a))
     for _ in range(2):
         code = Code("f", (), ("x",))
-        x = code.load("x", "0")
-        code.store(x + x, "x", "0")
+        x = code.load("x", 0)
+        code.store(x + x, "x", 0)
         values = np.arange(float(LANES))
-        calibrate.Compiled(str(code), "f", 0, 1).call(values.ctypes.data)
+        calibrate.Compiled(code.text(), "f", 0, 1).call(values.ctypes.data)
         assert np.array_equal(values, 2 * np.arange(LANES))
     assert len(made) == 1
 
