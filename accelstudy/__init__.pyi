@@ -6,8 +6,7 @@ from accelstudy.campaign.importing.log import Log as Log
 from accelstudy.campaign.session import Campaign as Campaign
 from accelstudy.data_sheets.sheet import DataSheet as DataSheet
 from accelstudy.diagnosis.report.output import Diagnosis as Diagnosis
-from accelstudy.epochs.results import Comparison as Comparison
-from accelstudy.epochs.results import History as History
+from accelstudy.epochs.history import History as History
 from accelstudy.lots.output import Lot as Lot
 from accelstudy.planning.design import Design as Design
 from accelstudy.planning.plan import Plan as Plan

@@ -100,7 +100,7 @@ SECTIONS = {
             out="CSV or Parquet file to write.",
         ),
         Command(calibrations.export),
-        Command(sensors.compare, writes=outputs.COMPARISON.place),
+        Command(sensors.compare, writes=outputs.HISTORY.place),
         Command(sensors.history, writes=outputs.HISTORY.place),
     ],
     "Before a calibration, and what it is worth": [

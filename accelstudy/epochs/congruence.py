@@ -1,15 +1,17 @@
-"""The congruence test of two epochs, and the search for what changed, as in deformation analysis.
+"""The congruence test of epochs, and the search for what changed, as in deformation analysis.
 
-The differences d of the parameters have the covariance matrix S = C₁ + C₂. With stated noise
-dᵀ S⁻¹ d is χ² distributed if nothing changed (Pelzer 1971). Where sigmas were estimated, each C is
-an estimate by r degrees of freedom, and dᵀ S⁻¹ d / p is compared with F(p, ν).
+The parameters x of n epochs have the covariance matrices Cᵢ. With stated noise the weighted squares
+of x about their weighted mean are χ² distributed with f = (n − 1) p degrees of freedom if nothing
+changed; of two epochs they are dᵀ (C₁ + C₂)⁻¹ d, with the differences d (Pelzer 1971). Where sigmas
+were estimated, each C is an estimate by r degrees of freedom, and the squares / f are compared with
+F(f, ν).
 
-How the two variances compare is not known: the problem of Behrens & Fisher. An estimate that is
-small by chance makes dᵀ S⁻¹ d large, and its own share in S small; degrees of freedom by estimated
-shares (Welch & Satterthwaite) then promise certainty where there is none. So ν is that of the F
-variable with the same quantile as dᵀ S⁻¹ d has if the true C are r/χ²(r) times the estimated ones
-(the generalized p-value of Gamage, Mathew & Weerahandi 2004, J. Multivar. Anal. 88, 177). The level
-is kept, or not reached, whatever the variances are.
+How the variances of epochs compare is not known: the problem of Behrens & Fisher. An estimate that
+is small by chance makes the squares large, and its own share in them small; degrees of freedom by
+estimated shares (Welch & Satterthwaite) then promise certainty where there is none. So ν is that of
+the F variable with the same quantile as the squares have if the true C are r/χ²(r) times the
+estimated ones (the generalized p-value of Gamage, Mathew & Weerahandi 2004, J. Multivar. Anal. 88,
+177). The level is kept, or not reached, whatever the variances are.
 """
 
 from __future__ import annotations
@@ -20,8 +22,8 @@ from functools import cache, cached_property
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
-from scipy import linalg, optimize, special, stats
+from numpy.typing import ArrayLike, NDArray
+from scipy import optimize, special, stats
 from scipy.stats import qmc
 
 from accelstudy.adjustment.quality import noncentrality
@@ -42,12 +44,12 @@ STATISTIC_TOLERANCE = 1e-9
 
 
 class Test(NamedTuple):
-    """Whether differences are no larger than their covariance matrix says.
+    """Whether epochs differ by no more than their covariance matrices say.
 
     Attributes
     ----------
-    statistic : float, dᵀ S⁻¹ d / p
-    dof : (p, ν), of F; ν is infinite with stated noise
+    statistic : float, weighted squares / f
+    dof : (f, ν), of F; ν is infinite with stated noise
     p_value : float
     """
 
@@ -57,63 +59,60 @@ class Test(NamedTuple):
 
     @property
     def congruent(self) -> bool:
-        """Whether the differences are compatible with no change."""
+        """Whether the epochs are compatible with no change."""
         return self.p_value >= LEVEL
 
 
 @dataclass(frozen=True)
-class Differences:
-    """Differences of p parameters between two epochs.
+class Congruence:
+    """Parameters in several epochs, which are congruent if nothing changed.
 
     Attributes
     ----------
-    differences : (p,) array
-    covariances : two (p, p) arrays, of the epochs
-    dof : two numbers of degrees of freedom by which these were estimated; inf with stated noise
+    estimates : (n, p) array
+    covariances : (n, p, p) array
+    dof : (n,) array, degrees of freedom by which these were estimated; inf with stated noise
     """
 
-    differences: Array
-    covariances: tuple[Array, Array]
-    dof: tuple[float, float]
+    estimates: Array
+    covariances: Array
+    dof: Array
 
-    @property
-    def covariance(self) -> Array:
-        """Covariance matrix of the differences."""
-        return self.covariances[0] + self.covariances[1]
-
-    @property
-    def sigmas(self) -> Array:
-        """Sigmas of the differences, (p,)."""
-        return np.sqrt(np.diag(self.covariance))
-
-    def of(self, chosen: Sequence[int]) -> Differences:
-        """Differences of some of the parameters, whatever the others do."""
-        first, second = (c[np.ix_(chosen, chosen)] for c in self.covariances)
-        return Differences(self.differences[chosen], (first, second), self.dof)
+    def of(self, chosen: Sequence[int]) -> Congruence:
+        """Some of the parameters, whatever the others do."""
+        covariances = self.covariances[:, chosen][:, :, chosen]
+        return Congruence(self.estimates[:, chosen], covariances, self.dof)
 
     @cached_property
     def test(self) -> Test:
         """Test of congruence."""
-        p = len(self.differences)
+        n, p = self.estimates.shape
         if not p:
             return Test(0.0, (0, np.inf), 1.0)
-        squares, shares = self._split
-        statistic = float(np.sum(squares)) / p
-        parts = np.array([shares, 1 - shares])
-        nu = dof_of_squares(parts.sum(axis=1), parts @ parts.T, self.dof)
-        return Test(statistic, (p, nu), float(f_tail(statistic, p, nu)))
+        _, projector = self._about_the_mean
+        f, parts = (n - 1) * p, projector.reshape(n, p, n, p)
+        means = np.einsum("iaia->i", parts)
+        nu = dof_of_squares(means, np.einsum("iajb->ij", parts**2), self.dof)
+        statistic = self._squares / f
+        return Test(statistic, (f, nu), f_tail(statistic, f, nu))
 
     @cached_property
-    def _split(self) -> tuple[Array, Array]:
-        """Squares of the differences, and shares of the first epoch in S, (p,) each.
+    def _about_the_mean(self) -> tuple[Array, Array]:
+        """Roots of the weights, (n, p, p), and what whitened residuals about a mean are, (np, np).
 
-        They are in directions in which the covariance matrices of both epochs are diagonal.
+        Parameters may differ in size by many powers of ten, so the roots are of scaled ones.
         """
-        # Parameters may differ in size by many powers of ten.
-        size = self.sigmas
-        first, second = (c / np.outer(size, size) for c in self.covariances)
-        shares, directions = linalg.eigh(first, first + second)
-        return (directions.T @ (self.differences / size)) ** 2, np.clip(shares, 0.0, 1.0)
+        size = np.sqrt(np.diagonal(self.covariances, axis1=1, axis2=2).sum(axis=0))
+        roots = np.linalg.inv(np.linalg.cholesky(self.covariances / np.outer(size, size))) / size
+        basis = np.linalg.qr(np.concatenate(roots * size))[0]
+        return roots, np.eye(len(basis)) - basis @ basis.T
+
+    @cached_property
+    def _squares(self) -> float:
+        """Weighted squares about the mean."""
+        roots, projector = self._about_the_mean
+        z = np.einsum("nij,nj->ni", roots, self.estimates - self.estimates[0]).ravel()
+        return float(z @ projector @ z)
 
     @cached_property
     def fewest_changes(self) -> tuple[int, ...]:
@@ -122,7 +121,7 @@ class Differences:
         The one that explains most is added until the others are congruent. One that is no longer
         needed then is taken back.
         """
-        left, found = list(range(len(self.differences))), list[int]()
+        left, found = list(range(self.estimates.shape[1])), list[int]()
         while not self.of(left).test.congruent:
             found.append(left.pop(self._explains_most(left)))
         for i in found[:-1]:
@@ -132,27 +131,34 @@ class Differences:
 
     def instead_of(self, one: int) -> tuple[int, ...]:
         """Parameters that may have changed instead of one of `fewest_changes`."""
-        others = [i for i in range(len(self.differences)) if i not in self.fewest_changes]
+        every = range(self.estimates.shape[1])
+        others = [i for i in every if i not in self.fewest_changes]
         kept = [[*(i for i in others if i != other), one] for other in others]
         tests = [self.of(sorted(each)).test for each in kept]
         return tuple(other for other, test in zip(others, tests, strict=True) if test.congruent)
 
-    @cached_property
-    def detectable(self) -> Array:
-        """Changes (p,) of one parameter alone that the test finds with a probability of `POWER`."""
-        p, nu = self.test.dof
-        size = noncentrality(p, LEVEL, noise_dof=nu)
-        return np.sqrt(size / np.diag(np.linalg.inv(self.covariance)))
+    def detectable(self, course: ArrayLike) -> Array:
+        """Sizes (p,) from which on a change of one parameter alone is found.
+
+        The probability that the test finds it is `POWER`.
+
+        Parameters
+        ----------
+        course : (n,) array, change of the parameter in each epoch, in parts of its size
+        """
+        (f, nu), (roots, projector) = self.test.dof, self._about_the_mean
+        shown = np.einsum("n,nij->nij", np.asarray(course, dtype=float), roots)
+        columns = shown.reshape(len(projector), -1)
+        each = np.einsum("ik,ij,jk->k", columns, projector, columns)
+        return np.sqrt(noncentrality(f, LEVEL, noise_dof=nu) / each)
 
     def _explains_most(self, left: Sequence[int]) -> int:
         """Place of the parameter without which the others are the most congruent."""
-        rest = [np.sum(self.of([i for i in left if i != one])._split[0]) for one in left]
+        rest = [self.of([i for i in left if i != one])._squares for one in left]
         return first_best(rest, STATISTIC_TOLERANCE * rest[0])
 
 
-def dof_of_squares(
-    means: Array, products: Array, dof: Sequence[float] | Array, level: float = LEVEL
-) -> float:
+def dof_of_squares(means: Array, products: Array, dof: Array, level: float = LEVEL) -> float:
     """Degrees of freedom ν of F, where squares have variances that were estimated.
 
     The squares are zᵀ P z with a projector P = Σ Aₖ of the rank f, in which Aₖ has the variance k.
@@ -163,13 +169,13 @@ def dof_of_squares(
     ----------
     means : (k,) array, traces of Aₖ
     products : (k, k) array, traces of Aₖ Aₗ
-    dof : k degrees of freedom r of the variances; inf if one was stated
+    dof : (k,) array, degrees of freedom r of the variances; inf if one was stated
     level : float, of the quantile that the squares have in common with f times F(f, ν)
     """
-    inverse = 1 / _ratios(tuple(map(float, dof)))
-    f, mean = float(np.sum(means)), inverse @ means
     if np.isinf(dof).all():
         return np.inf
+    inverse = 1 / _ratios(tuple(map(float, dof)))
+    f, mean = float(np.sum(means)), inverse @ means
     scale = np.einsum("nk,kl,nl->n", inverse, products, inverse) / mean
 
     def too_often(log: float) -> float:

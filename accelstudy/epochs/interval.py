@@ -22,7 +22,7 @@ from accelstudy.basics.units import GON, MGON
 from accelstudy.epochs.course import YEAR
 
 if TYPE_CHECKING:
-    from accelstudy.epochs.results import History
+    from accelstudy.epochs.history import History
 
 Array = NDArray[np.float64]
 
@@ -42,13 +42,11 @@ class Interval:
     ----------
     history : History
     accuracy : float, rad, rms of roll and of pitch over the tilts
-    tilt_range : float, rad
     confidence : float, probability that neither of the two is larger
     """
 
     history: History
     accuracy: float
-    tilt_range: float
     confidence: float
 
     def error(self, years: float) -> float:
@@ -84,7 +82,7 @@ class Interval:
             "years": self.years,
             "until": self.until.date().isoformat(),
             "accuracy_mgon": self.accuracy / MGON,
-            "max_tilt_gon": self.tilt_range / GON,
+            "max_tilt_gon": self.history.tilt_range / GON,
             "confidence": self.confidence,
             "errors": [{"years": t, "mgon": self.error(t) / MGON} for t in SHOWN_YEARS],
         }
@@ -93,7 +91,7 @@ class Interval:
     def _squares(self) -> tuple[Array, Array, Array]:
         """Squared errors of roll and pitch of the draws, (DRAWS, 2), as a + b t + c t², rad²."""
         values = self.history.estimates[-1]
-        form = self.history.tilt_error(values, values, self.tilt_range).quadratic
+        form = self.history.tilt_error(values, values).quadratic
         at_once, per_year = self._draw(np.einsum("auu->u", form))
         first, second = (np.einsum("ku,auw->kaw", each, form) for each in (at_once, per_year))
         return (

@@ -94,11 +94,13 @@ CAMPAIGN = OutputKind(
     replaced=False,
 )
 BATCH = OutputKind("batch", "campaigns.parquet", ("parameters.parquet", "report.html"), ("each",))
-COMPARISON = OutputKind(
-    "comparison of calibrations", "comparison.json", ("report.html",), ("figures",)
+# comparison.json and history.parquet are of folders of 0.3.
+HISTORY = OutputKind(
+    "history",
+    "history.json",
+    ("comparison.json", "history.parquet", "report.html"),
+    ("figures",),
 )
-# history.parquet is of folders of 0.3.
-HISTORY = OutputKind("history", "history.json", ("history.parquet", "report.html"), ("figures",))
 LOT = OutputKind("lot", "lot.json", ("type.yaml", "report.html"), ("figures", "each"))
 # study.yaml is of folders of 0.3.
 _PLAN_FILES = ("positions.yaml", "study.yaml", "plan.svg", "plan.png")
@@ -116,7 +118,7 @@ STUDY = OutputKind(
     replaced=False,
 )
 _WITH_MARKERS = (
-    *(BATCH, DIAGNOSIS, CALIBRATION, CAMPAIGN, COMPARISON, HISTORY, LOT, PLAN, SIMULATION),
+    *(BATCH, DIAGNOSIS, CALIBRATION, CAMPAIGN, HISTORY, LOT, PLAN, SIMULATION),
     ADVICE,
 )
 """Kinds that a folder is recognised as; one that holds the files of another comes first."""

@@ -17,7 +17,7 @@ from accelstudy.verbs import kinds
 from accelstudy.verbs.kinds import verb
 
 if TYPE_CHECKING:
-    from accelstudy import Batch, Calibration, Campaign, Comparison, History, Lot
+    from accelstudy import Batch, Calibration, Campaign, History, Lot
 
 
 @verb
@@ -26,14 +26,14 @@ def compare(
     second: Calibration | str | PathLike[str],
     *,
     tilt_range: kinds.Tilt = "50gon",
-) -> Comparison:
+) -> History:
     """Say whether a sensor is still what it was.
 
     The congruence test of deformation analysis takes all parameters with both covariance matrices;
     if it rejects, the parameters that changed are named, at one level for all. The change is also
     given in roll and pitch. Both calibrations have to be of one model.
 
-    The folder of results gets report.html, comparison.json and a figure.
+    The folder of results gets report.html, history.json and a figure.
 
     Parameters
     ----------
@@ -54,10 +54,10 @@ def compare(
         accelstudy compare spring/calibration.json autumn/calibration.json --out both
     """
     from accelstudy.campaign.calibration.sensor_calibration import sensor_of
-    from accelstudy.epochs.results import Comparison
+    from accelstudy.epochs.history import History
 
     # The range is in SI by `verb`.
-    return Comparison(sensor_of(first, "first"), sensor_of(second, "second"), float(tilt_range))
+    return History((sensor_of(first, "first"), sensor_of(second, "second")), (), float(tilt_range))
 
 
 @verb
@@ -71,9 +71,9 @@ def history(
 ) -> History:
     """Say how a sensor changes over time.
 
-    For each parameter there is a rate with its interval, and the scatter from session to session,
-    as by switching the sensor off and on. All tests together have one level. All calibrations have
-    to be of one model.
+    The congruence test says what changed. For each parameter there is a rate with its interval, and
+    the scatter from session to session, as by switching the sensor off and on. All tests together
+    have one level. All calibrations have to be of one model; of two, it says what `compare` does.
 
     With `tilt_accuracy` it says how long the last calibration is good enough, and what a new one
     would gain.
@@ -83,21 +83,21 @@ def history(
     Parameters
     ----------
     calibrations : sequence of Calibration or path
-        Three or more calibration.json files of one sensor.
+        calibration.json files of one sensor; three or more for rates and scatter.
     dates : sequence of str or datetime
         Date of a calibration, as 2026-03-01 or 2026-03-01T14:00; one for each, in their order.
         [default: those of the campaigns]
     tilt_accuracy : float in rad, or str with a unit
         Ask how long the last calibration stays this accurate in roll and pitch, as 10mgon.
     tilt_range : float in rad, or str with a unit
-        Largest tilt at which the accuracy is wanted.
+        Tilts over which roll and pitch are compared, and at which the accuracy is wanted.
     confidence : float or str
         Probability with which it stays so.
 
     Raises
     ------
     InputError
-        If they are fewer than three, of one date, or of different models.
+        If they are fewer than two, of one date, or of different models.
 
     Examples
     --------
@@ -106,16 +106,14 @@ def history(
             years
     """
     from accelstudy.campaign.calibration.sensor_calibration import sensor_of
-    from accelstudy.epochs.results import History, dates_of
+    from accelstudy.epochs.history import History, dates_of
 
     calibrations = as_sequence(calibrations)
     check_once(calibrations, "calibration")
     sensors = [sensor_of(one) for one in calibrations]
     dated = dates_of(sensors, dates, [*map(str, calibrations)])
-    wanted = None
-    if tilt_accuracy is not None:
-        wanted = float(tilt_accuracy), float(tilt_range), float(confidence)  # in SI by `verb`
-    return History(sensors, dated, wanted)
+    accuracy = None if tilt_accuracy is None else float(tilt_accuracy)  # in SI by `verb`
+    return History(sensors, dated, float(tilt_range), accuracy, float(confidence))
 
 
 @verb

@@ -13,7 +13,7 @@ from accelstudy.basics.units import GON
 from accelstudy.basics.units import STANDARD_GRAVITY as G
 from accelstudy.campaign.calibration.document import json_text
 from accelstudy.campaign.calibration.sensor_calibration import calibration_of
-from accelstudy.epochs.results import Comparison
+from accelstudy.epochs.history import History
 from accelstudy.leveling.angles import angles_of, wrap_angle
 from accelstudy.leveling.error import cap_forces
 
@@ -23,7 +23,7 @@ def calibrated(seed, **options):
 
 
 def compare(first, second):
-    return Comparison(first, second, 50 * GON)
+    return History((first, second), (), 50 * GON)
 
 
 def test_the_change_of_roll_and_pitch_is_that_of_readings():
@@ -66,12 +66,12 @@ def test_the_command_writes_what_it_says(changed, tmp_path):
     write_document(tmp_path / "b.json", 2, effects=effects)
     out = tmp_path / "out"
     told = succeed("compare", tmp_path / "a.json", tmp_path / "b.json", "--out", out).stdout
-    content = json.loads((out / "comparison.json").read_text(encoding="utf-8"))
+    content = json.loads((out / "history.json").read_text(encoding="utf-8"))
     assert content["state"] == ("changed" if changed else "unchanged")
     assert (content["test"]["p_value"] < content["test"]["level"]) == changed
-    assert [p["name"] for p in content["parameters"] if p["changed"]] == ["b_y"] * changed
+    assert [p["name"] for p in content["parameters"] if p["found"]] == ["b_y"] * changed
     assert told.startswith(f"{content['state'].upper()}: {content['verdict']}")
     page = (out / "report.html").read_text(encoding="utf-8")
     assert_sound(page)
     assert "session-1 and session-2 compared" in text_of(page)
-    assert (out / "figures/changes.svg").is_file()
+    assert (out / "figures/history.svg").is_file()

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from accelstudy.adjustment.quality import POWER
-from accelstudy.epochs.congruence import LEVEL, Differences, dof_of_squares
+from accelstudy.epochs.congruence import LEVEL, Congruence, dof_of_squares
 
 N = 1000
 STANDARD_ERRORS = 3.3
@@ -19,6 +19,12 @@ def cofactors(rng, n, p=P):
 
 def differences(rng, covariance, n=N):
     return rng.standard_normal((n, len(covariance))) @ np.linalg.cholesky(covariance).T
+
+
+def epochs(d, covariances, dof=np.inf):
+    """Two epochs that differ by d; estimates of the first one are large."""
+    first = np.full(len(d), 10.0)
+    return Congruence(np.array([first, first + d]), np.array(covariances), np.broadcast_to(dof, 2))
 
 
 def estimated(rng, dof, n=N):
@@ -62,7 +68,7 @@ def test_few_positions_by_gravity_beside_many_with_a_robot_keep_the_level(n, rat
         sessions.append((noise @ solve.T, solve @ solve.T, variance))
     (one, q, s), (other, r, t) = sessions
     rejected = [
-        not Differences(b - a, (v * q, w * r), (n - P, 63)).test.congruent
+        not epochs(b - a, (v * q, w * r), (n - P, 63)).test.congruent
         for a, b, v, w in zip(one, other, s, t, strict=True)
     ]
     assert np.mean(rejected) <= LEVEL + tolerance(LEVEL, draws)
@@ -83,11 +89,11 @@ def test_a_detectable_change_is_found_about_as_often_as_is_said(dof, least):
     rng = np.random.default_rng(2)
     q = cofactors(rng, 40)
     change = np.zeros(P)
-    change[3] = Differences(change, (q, q), (dof, dof)).detectable[3]
+    change[3] = epochs(change, (q, q), dof).detectable([0, 1])[3]
     n = 200
     drawn = differences(rng, 2 * q, n) + change
     variances = zip(estimated(rng, dof, n), estimated(rng, dof, n), strict=True)
-    found = [not Differences(d, (v * q, w * q), (dof, dof)).test.congruent
+    found = [not epochs(d, (v * q, w * q), dof).test.congruent
              for d, (v, w) in zip(drawn, variances, strict=True)]  # fmt: skip
     assert least - tolerance(POWER, n) <= np.mean(found) <= POWER + tolerance(POWER, n)
 
@@ -96,14 +102,11 @@ def test_the_parameter_that_changed_is_named_and_no_other():
     rng = np.random.default_rng(3)
     q = cofactors(rng, 40), cofactors(rng, 25)
     none, one, two = np.zeros((3, P))
-    one[4] = 3 * Differences(none, q, (np.inf, np.inf)).detectable[4]
-    two[[0, 4]] = 3 * Differences(none, q, (np.inf, np.inf)).detectable[[0, 4]]
+    one[4] = 3 * epochs(none, q).detectable([0, 1])[4]
+    two[[0, 4]] = 3 * epochs(none, q).detectable([0, 1])[[0, 4]]
     n = 200
     for true, said in ((none, ()), (one, (4,)), (two, (0, 4))):
-        right = [
-            Differences(d, q, (np.inf, np.inf)).fewest_changes == said
-            for d in true + differences(rng, sum(q), n)
-        ]
+        right = [epochs(d, q).fewest_changes == said for d in true + differences(rng, sum(q), n)]
         assert np.mean(right) >= 1 - LEVEL - tolerance(LEVEL, n)
 
 
@@ -111,6 +114,6 @@ def test_parameters_that_cannot_be_told_apart_are_named_together():
     correlation = np.eye(3)
     correlation[0, 1] = correlation[1, 0] = -0.999
     covariance = correlation / 2
-    change = Differences(np.array([0.2, 0.0, 0.3]), (covariance, covariance), (np.inf, np.inf))
+    change = epochs(np.array([0.2, 0.0, 0.3]), (covariance, covariance))
     (found,) = change.fewest_changes
     assert change.instead_of(found) == (1 - found,)

@@ -11,7 +11,7 @@ from session_helpers import SENSOR, write_document
 import accelstudy as acs
 from accelstudy.adjustment.quality import POWER
 from accelstudy.campaign.format import read_campaign, write_campaign
-from accelstudy.epochs.congruence import LEVEL
+from accelstudy.epochs.congruence import LEVEL, Congruence
 from accelstudy.epochs.course import ParameterCourse
 
 N = 500
@@ -39,6 +39,12 @@ def drawn(seed, sigmas, *, n=N, rate=0.0, scatter=0.0, dof=STATED):
         yield ParameterCourse(DATES, values, sigmas**2 * variances, dof)
 
 
+def change_of(course):
+    """The congruence test of a parameter alone."""
+    variances = course.variances[:, None, None]
+    return Congruence(course.values[:, None], variances, course.dof)
+
+
 @pytest.mark.parametrize(("sigmas", "dof"), [
     (UNEQUAL, STATED), (EQUAL, np.full(6, 9.0)), (UNEQUAL, np.array([63.0, 1, 63, 3, np.inf, 2])),
 ])  # fmt: skip
@@ -46,8 +52,8 @@ def test_what_is_not_there_is_found_no_more_often_than_is_said(sigmas, dof):
     """A change where there is none, and a scatter beside a drift."""
     sure = np.isinf(dof).all()
     n = 300 if sure else 60
-    still = [c.p_values()[0] < LEVEL for c in drawn(1, sigmas, n=n, dof=dof)]
-    drifting = [c.p_values()[2] < LEVEL for c in drawn(1, sigmas, n=n, dof=dof, rate=3.0)]
+    still = [change_of(c).test.p_value < LEVEL for c in drawn(1, sigmas, n=n, dof=dof)]
+    drifting = [c.p_value_of_scatter() < LEVEL for c in drawn(1, sigmas, n=n, dof=dof, rate=3.0)]
     for found in (still, drifting):
         assert np.mean(found) <= LEVEL + tolerance(LEVEL, n)
         if sure:
@@ -102,7 +108,7 @@ def test_all_tests_have_one_level(true):
     """Nine parameters whose noise is correlated, and of which none does anything, or three do."""
     rng = np.random.default_rng(3)
     root = np.linalg.cholesky(np.linalg.inv(np.cov(rng.standard_normal((9, 30)))))
-    variances = np.outer(UNEQUAL**2, np.sum(root**2, axis=1))
+    covariances = UNEQUAL[:, None, None] ** 2 * (root @ root.T)
     n, many = 60, 0 if true is None else 3
     right = {"changed"} if true is None else {"changed", true}
     wrong = 0
@@ -110,21 +116,21 @@ def test_all_tests_have_one_level(true):
         values = UNEQUAL[:, None] * (rng.standard_normal((6, 9)) @ root.T)
         shape = rng.standard_normal((6, 3)) if true == "scatters" else np.tile(DATES, (3, 1)).T
         values[:, :many] += 20 * shape[:, :many]
-        found = [{*ParameterCourse(DATES, x, v, STATED).found(LEVEL / 9)}
-                 for x, v in zip(values.T, variances.T, strict=True)]  # fmt: skip
-        wrong += any(f - right for f in found[:many]) or any(found[many:])
+        changed = Congruence(values, covariances, STATED).fewest_changes
+        variances = np.diagonal(covariances, axis1=1, axis2=2)
+        found = [{*ParameterCourse(DATES, values[:, k], variances[:, k], STATED).found(LEVEL / 9)}
+                 for k in changed]  # fmt: skip
+        wrong += any(f - right for f in found) or any(k >= many for k in changed)
     assert wrong / n <= LEVEL + tolerance(LEVEL, n)
 
 
 @pytest.mark.parametrize(("sigmas", "dof"), [(UNEQUAL, STATED), (EQUAL, np.full(6, 15.0))])
 def test_what_is_detectable_is_found_as_often_as_is_said(sigmas, dof):
     known = ParameterCourse(DATES, DATES, sigmas**2, dof)
-    for size in (
-        {"rate": known.detectable_rate(0.01)}, {"scatter": known.detectable_scatter(0.01)}
-    ):  # fmt: skip
-        found = [c.p_values(0.01)[0] < 0.01 for c in drawn(4, sigmas, n=150, dof=dof, **size)]
-        # With estimated sigmas, and of the scatter with unequal ones, the distribution is near it.
-        assert np.mean(found) == pytest.approx(POWER, abs=tolerance(POWER, 150) + 0.03)
+    (rate,) = change_of(known).detectable(DATES)
+    found = [change_of(c).test.p_value < LEVEL for c in drawn(4, sigmas, n=150, dof=dof, rate=rate)]
+    # With estimated sigmas the distribution is near it.
+    assert np.mean(found) == pytest.approx(POWER, abs=tolerance(POWER, 150) + 0.03)
 
 
 YEARS = ("2023-01-01", "2023-07-01", "2024-01-01", "2024-06-30", "2025-01-01")

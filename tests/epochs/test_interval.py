@@ -10,8 +10,8 @@ from session_helpers import document
 from accelstudy.basics.units import GON, MGON
 from accelstudy.campaign.calibration.sensor_calibration import calibration_of
 from accelstudy.epochs.course import YEAR
+from accelstudy.epochs.history import History
 from accelstudy.epochs.interval import MAX_YEARS, Interval
-from accelstudy.epochs.results import History
 
 G = 9.80665
 N = 40
@@ -66,7 +66,7 @@ def test_the_promise_is_kept(session, sessions, scatter, drift):
         truth = switched[:-1] + at[:, None] * rate
         estimates = truth + rng.standard_normal(truth.shape) @ root.T
         each = [replace(session, parameters=estimate) for estimate in estimates]
-        interval = Interval(History(each, dates), MGON, 50 * GON, CONFIDENCE)
+        interval = Interval(History(each, dates, 50 * GON), MGON, CONFIDENCE)
         kept.append([
             error_in_use(switched[-1] + rate * years, estimates[-1], directions)
             <= interval.error(years) for years in (0.0, 1.0)
@@ -82,9 +82,9 @@ def test_a_sensor_that_drifts_is_good_until_the_drift_is_as_large(session):
     each = [
         replace(quiet, parameters=session.parameters + 0.01 * years * np.eye(6)[0]) for years in AT
     ]
-    history, small = History(each, dates), 1e-3
-    interval = Interval(history, 0.01 / G * 2.5, small, CONFIDENCE)
+    history = History(each, dates, 1e-3)
+    interval = Interval(history, 0.01 / G * 2.5, CONFIDENCE)
     assert interval.years == pytest.approx(2.5, rel=5e-3)  # the scale of x is not 1
     assert (interval.until - dates[-1]).total_seconds() / YEAR == pytest.approx(interval.years)
-    assert Interval(history, 0.01 / G * 20, small, CONFIDENCE).years == MAX_YEARS
-    assert Interval(History([session] * 3, dates[:3]), 1e-6, small, CONFIDENCE).years == 0
+    assert Interval(history, 0.01 / G * 20, CONFIDENCE).years == MAX_YEARS
+    assert Interval(History([session] * 3, dates[:3], 1e-3), 1e-6, CONFIDENCE).years == 0

@@ -89,7 +89,6 @@ def test_each_key_and_column_of_a_calibration_is_described(tmp_path):
         assert [error.message for error in schema.iter_errors(content)] == []
         assert document.check(content).model_dump(exclude_unset=True, by_alias=True) == content
     written = {
-        "comparison": accelstudy.compare(one, one).content,
         "history": three.content,
     }
     for name, content in written.items():

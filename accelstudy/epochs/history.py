@@ -1,0 +1,434 @@
+"""Calibrations of one sensor with one model, at two times or more: what changed, and how."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from datetime import datetime
+from functools import cached_property
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pandas as pd
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from numpy.typing import NDArray
+
+from accelstudy.basics.dates import read_date
+from accelstudy.basics.errors import InputError, key
+from accelstudy.basics.shares import sigmas_95
+from accelstudy.basics.units import GON, MGON, shown_unit, to_display
+from accelstudy.basics.wording import comma_list, estimate, plural
+from accelstudy.campaign.calibration.document import json_content, write_json
+from accelstudy.campaign.calibration.sensor_calibration import SensorCalibration
+from accelstudy.drawing.saving import save_all
+from accelstudy.drawing.style import FULL, INK, group_colour, group_of, new_figure, symbol
+from accelstudy.epochs.congruence import LEVEL, Congruence
+from accelstudy.epochs.course import YEAR, ParameterCourse
+from accelstudy.epochs.interval import Interval
+from accelstudy.files.outputs import HISTORY
+from accelstudy.leveling.error import ATTITUDES, TiltError, cap_forces, tilt_error
+from accelstudy.pages import render_lines, write_page
+from accelstudy.pages.result import Result
+
+Array = NDArray[np.float64]
+
+STATES = {True: "unchanged", False: "changed"}
+"""States of a result by whether the calibrations agree."""
+MIN_COURSE = 3
+"""Calibrations of which a line leaves a degree of freedom."""
+MIN_DIFFERENCE = 1e-12
+"""rad, largest difference of tilts that rounding may cause."""
+PANELS = 3
+"""Panels side by side."""
+LINE_POINTS = 50
+"""Number of points of a line."""
+
+
+class History(Result):
+    """Calibrations of one sensor over time: what changed, and what drifts or scatters.
+
+    What changed is told by all parameters together, with their whole covariance matrices. Of two
+    calibrations that is all; of three or more each parameter that changed is a line over time,
+    beside which sessions scatter.
+
+    Attributes
+    ----------
+    calibrations : tuple of n SensorCalibration, in the order of time
+    model : SensorModel
+    estimates : (n, p) array, SI
+    covariances : (n, p, p) array
+    sigmas : (n, p) array
+    dates : tuple of n datetime, or empty if there are two without any
+    tilt_range : float, rad, over which tilts are compared
+    change : accelstudy.epochs.congruence.Congruence, of all parameters
+    courses : tuple of p accelstudy.epochs.course.ParameterCourse; empty for two calibrations
+    interval : accelstudy.epochs.interval.Interval, how long the last calibration stays good enough;
+        None if no accuracy was given
+    sensor : str, what was calibrated; None if no campaign says it
+    """
+
+    kind = HISTORY
+    size = FULL, 70.0
+
+    def __init__(
+        self,
+        calibrations: Sequence[SensorCalibration],
+        dates: Sequence[datetime],
+        tilt_range: float,
+        accuracy: float | None = None,
+        confidence: float = 0.95,
+    ) -> None:
+        """Put calibrations in the order of time.
+
+        Parameters
+        ----------
+        calibrations, dates : of one sensor; two may have no dates, and are in their order then
+        tilt_range : float, rad
+        accuracy, confidence : as in `Interval`; None for no interval
+
+        Raises
+        ------
+        InputError
+            If they are fewer than two, of one date, or of different models.
+        """
+        if (n := len(calibrations)) < 2 or (accuracy is not None and n < MIN_COURSE):
+            least = "two or more" if accuracy is None else "three or more to tell an interval"
+            raise InputError(f"CALIBRATION: a history has {least}, not {n}")
+        if dates and len(set(dates)) < 2 and n >= MIN_COURSE:
+            raise InputError(f"{key('dates')}: all are the same; a rate needs two dates or more")
+        order = sorted(range(n), key=dates.__getitem__) if dates else range(n)
+        self.calibrations = tuple(calibrations[i] for i in order)
+        self.dates = tuple(dates[i] for i in order) if dates else ()
+        _check_alike(self.calibrations)
+        self.model, self.tilt_range = self.calibrations[0].model, tilt_range
+        self.parameters, names = self.model.parameters, self.model.parameter_names
+        self.estimates, self.covariances = (
+            np.zeros((n, len(names))),
+            np.zeros((n, *[len(names)] * 2)),
+        )
+        for i, one in enumerate(self.calibrations):
+            places = [one.model.parameter_names.index(name) for name in names]
+            self.estimates[i] = one.parameters[places]
+            self.covariances[i] = one.covariance[np.ix_(places, places)]
+        self.sigmas = np.sqrt(np.diagonal(self.covariances, axis1=1, axis2=2))
+        dof = np.array([one.dof for one in self.calibrations])
+        self.change = Congruence(self.estimates, self.covariances, dof)
+        self.courses: tuple[ParameterCourse, ...] = ()
+        if n >= MIN_COURSE:
+            each = zip(self.estimates.T, np.square(self.sigmas).T, strict=True)
+            self.courses = tuple(ParameterCourse(self.years, *one, dof) for one in each)
+        self.interval = None
+        if accuracy is not None:
+            self.interval = Interval(self, accuracy, confidence)
+        sensors = (one.content["sensor"] for one in self.calibrations)
+        self.sensor: str | None = next(filter(None, sensors), None)
+        campaigns = " and ".join(one.content["campaign"] for one in self.calibrations)
+        self.name = campaigns if n == 2 else self.sensor or self.calibrations[0].content["campaign"]
+
+    @property
+    def years(self) -> Array:
+        """Times of the calibrations, (n,), in years since the last one; −1 and 0 without dates."""
+        if not self.dates:
+            return np.array([-1.0, 0.0])
+        return np.array([(date - self.dates[-1]).total_seconds() / YEAR for date in self.dates])
+
+    @cached_property
+    def found(self) -> tuple[tuple[str, ...], ...]:
+        """What each parameter does over time, in words: nothing, if it did not change.
+
+        Of two tests of each parameter that changed one may fail by chance, for a drift or a
+        scatter, of which one is there: so all of them together have the level of one.
+        """
+        changed, p = self.change.fewest_changes, len(self.parameters)
+        if not self.courses:
+            return tuple(("changed",) if k in changed else () for k in range(p))
+        return tuple(
+            course.found(LEVEL / p) if k in changed else () for k, course in enumerate(self.courses)
+        )
+
+    def tilt_error(self, first: Array, second: Array) -> TiltError:
+        """Tilt error by one set of parameters for another, in conditions of the last session."""
+        last = self.calibrations[-1]
+        forces = cap_forces(self.tilt_range, ATTITUDES, last.gravity)
+        forces, hold = last.with_conditions(forces, self.model.hold_columns)
+        return tilt_error(self.model, first, self.model, second, forces, last.gravity, hold)
+
+    @cached_property
+    def tilt(self) -> Array:
+        """Rms by which roll and pitch differ, and that which chance would give, (2, 2), rad.
+
+        Readings are those of the sensor as it was at first; they are leveled as if it had not
+        changed, and as it is at last.
+        """
+        error = self.tilt_error(self.estimates[0], self.estimates[-1])
+        covariance = self.covariances[0] + self.covariances[-1]
+        by_chance = np.einsum("auw,uw->a", error.quadratic, covariance)
+        plain = np.where(error.constant > MIN_DIFFERENCE**2, error.constant, 0.0)
+        return np.sqrt([plain, by_chance])
+
+    @cached_property
+    def rows(self) -> list[dict[str, Any]]:
+        """What history.json has of each parameter."""
+        changes = self.estimates[-1] - self.estimates[0]
+        steady = 1 - self.years / self.years[0] if self.years[0] else np.array([0.0, 1.0])
+        detectable, names = self.change.detectable(steady), self.model.parameter_names
+        rows = []
+        for k, parameter in enumerate(self.parameters):
+            instead = self.change.instead_of(k) if self.found[k] else ()
+            row = {
+                "name": parameter.name,
+                "unit": parameter.unit,
+                "values": self.estimates[:, k],
+                "sigmas": self.sigmas[:, k],
+                "change": changes[k],
+                "sigma": np.hypot(*self.sigmas[[0, -1], k]),
+                "detectable": detectable[k],
+                "found": self.found[k],
+                "or": [names[i] for i in instead],
+                "rate": None,
+                "scatter": None,
+            }
+            if self.courses:
+                course = self.courses[k]
+                row["rate"] = {
+                    "per_year": course.rate.per_year,
+                    "sigma": course.rate.sigma,
+                    "ci95": course.rate.interval,
+                    "ci95_wandering": course.wandering_rate.interval,
+                    "p_value": course.rate.p_value,
+                }
+                row["scatter"] = {
+                    "sd": course.line.scatter,
+                    "ci95": course.line.scatter_interval(),
+                    "p_value": course.p_value_of_scatter(LEVEL / len(self.parameters)),
+                }
+            rows.append(row)
+        return rows
+
+    @cached_property
+    def sentences(self) -> list[str]:
+        """What changed, drifts and scatters, and what it matters; the verdict comes first."""
+        texts: dict[str, list[str]] = {"drifts": [], "unsure": [], "scatters": [], "changed": []}
+        for k, row in enumerate(self.rows):
+            if "drifts" in row["found"]:
+                rate, walk = self.courses[k].rate, self.courses[k].wandering_rate
+                texts["drifts"].append(change_text(row, *rate[:2]))
+                if walk.p_value >= LEVEL / len(self.rows):
+                    texts["unsure"].append(change_text(row, *walk[:2]))
+            if "scatters" in row["found"]:
+                scatter = size_text(row["scatter"]["sd"], row["unit"])
+                texts["scatters"].append(f"{row['name']} by {scatter}")
+            if "changed" in row["found"]:
+                texts["changed"].append(change_text(row, row["change"], row["sigma"]))
+        largest = dict[str, dict[str, Any]]()
+        for row in sorted(self.rows, key=lambda row: row["detectable"]):
+            largest[row["unit"]] = row
+        least = [
+            f"{size_text(row['detectable'], row['unit'])} in {row['name']}"
+            for row in self.rows
+            if largest[row["unit"]] is row
+        ]
+        return render_lines("epochs/wording.txt.j2", "history", self, texts, least)
+
+    @cached_property
+    def content(self) -> dict[str, Any]:
+        """Content of history.json, in SI but for keys that name another unit; per year."""
+        test = self.change.test
+        names = ("roll_mgon", "pitch_mgon", "roll_by_chance_mgon", "pitch_by_chance_mgon")
+        tilt = zip(names, (self.tilt / MGON).ravel().tolist(), strict=True)
+        dates = [date.isoformat() for date in self.dates] or [None] * len(self.calibrations)
+        content: dict[str, Any] = json_content({
+            "schema_version": 1,
+            "sensor": self.sensor,
+            "calibrations": [
+                {"campaign": one.content["campaign"], "date": date}
+                for one, date in zip(self.calibrations, dates, strict=True)
+            ],
+            "effects": [effect.spec for effect in self.model.effects],
+            "state": STATES[test.congruent],
+            "test": {**test._asdict(), "level": LEVEL},
+            "parameters": self.rows,
+            "tilt": {**dict(tilt), "max_tilt_gon": self.tilt_range / GON},
+            "interval": self.interval and self.interval.content,
+            "verdict": " ".join(self.sentences),
+        })  # fmt: skip
+        return content
+
+    def to_frame(self) -> pd.DataFrame:
+        """Return the change of each parameter, its rate a year and scatter, and what was found."""
+        rows = pd.json_normalize([*self.content["parameters"]]).set_index("name")
+        rows["found"] = rows["found"].str.join(", ")
+        rates = {
+            "rate.per_year": "rate_per_year",
+            "rate.sigma": "sigma_rate",
+            "scatter.sd": "scatter",
+        }
+        columns = [
+            "change",
+            "sigma",
+            "detectable",
+            *(rates if self.courses else ()),
+            "unit",
+            "found",
+        ]
+        return rows[columns].rename(columns=rates)
+
+    def write(self, folder: Path, place: Path) -> None:
+        """Write the page with its figure, and the JSON file."""
+        write_page(
+            folder / "report.html",
+            "epochs/report.html.j2",
+            self.verdict,
+            doc=self.content,
+            h=self,
+            lines=self.sentences,
+            figure=save_all({"history": self.figure}, folder / "figures")["history"],
+        )
+        write_json(folder / self.kind.marker, self.content)
+
+    @property
+    def _times(self) -> NDArray[Any]:
+        """Times of the calibrations, for the axis of a figure: dates, or numbers without any."""
+        return np.array(self.dates, dtype="datetime64[us]") if self.dates else np.arange(1, 3)
+
+    def draw(self, ax: Axes) -> None:
+        """Draw the deviation of each parameter from the first calibration, over its sigma."""
+        off = (self.estimates - self.estimates[0]) / self.sigmas
+        ax.plot(self._times, off, "o-", markersize=3, label=self.model.parameter_names)
+        ax.set(
+            xlabel="date" if self.dates else "calibration", ylabel="change since the first / sigma"
+        )
+        ax.legend(ncols=4)
+
+    def figure(self) -> Figure:
+        """Draw each parameter in all calibrations, and its line, with 95 % intervals."""
+        rows = -(-len(self.parameters) // PANELS)
+        figure = new_figure(FULL, 12 + 36 * rows)
+        panels = figure.subplots(rows, PANELS, sharex=True, squeeze=False).ravel()
+        for k, ax in enumerate(panels[: len(self.parameters)]):
+            self._draw_parameter(ax, k)
+            ax.tick_params(axis="x", labelbottom=k + PANELS >= len(self.parameters))
+        for ax in panels[len(self.parameters) :]:
+            ax.set_visible(False)
+        lines = " and lines with 95 % intervals; dotted: no drift found"
+        figure.suptitle(f"Calibrations{lines if self.courses else ' with 95 % intervals'}")
+        return figure
+
+    def _draw_parameter(self, ax: Axes, k: int) -> None:
+        """Draw the calibrations of a parameter, and its line with the band that holds 95 %."""
+        parameter, found = self.parameters[k], self.found[k]
+        unit, times = parameter.unit, self._times
+        values, halves = (to_display(v[:, k], unit) for v in (self.estimates, 1.96 * self.sigmas))
+        ax.errorbar(times, values, halves, fmt="o", color=INK, capsize=2, linewidth=0.8, ms=3)
+        ax.set_title(symbol(parameter.name) + (f" ({' and '.join(found)})" if found else ""))
+        ax.set_ylabel(shown_unit(unit))
+        if not self.dates:
+            ax.set_xticks(times)
+            return
+        from matplotlib.dates import AutoDateLocator, ConciseDateFormatter
+
+        locator = AutoDateLocator(minticks=2, maxticks=5)  # type: ignore[no-untyped-call]
+        formatter = ConciseDateFormatter(locator)  # type: ignore[no-untyped-call]
+        ax.xaxis.set(major_locator=locator, major_formatter=formatter)
+        if not self.courses:
+            return
+        course, colour = self.courses[k], group_colour(group_of(parameter.name))
+        years = np.linspace(course.years[0], 0.0, LINE_POINTS)
+        design = np.column_stack([np.ones(LINE_POINTS), years])
+        between = times[-1] + (years * YEAR * 1e6).astype("timedelta64[us]")
+        line = to_display(design @ course.line.estimates, unit)
+        variance = np.einsum("iu,uw,iw->i", design, course.line.covariance, design)
+        half = to_display(sigmas_95(course.rate.dof) * np.sqrt(variance), unit)
+        seen = ax.get_ylim()
+        ax.fill_between(between, line - half, line + half, color=colour, alpha=0.15, linewidth=0)
+        ax.plot(between, line, "-" if "drifts" in found else ":", color=colour)
+        # The band of a few calibrations would dwarf them.
+        ax.set_ylim(seen[0] - 0.3 * np.ptp(seen), seen[1] + 0.3 * np.ptp(seen))
+
+
+def _check_alike(calibrations: Sequence[SensorCalibration]) -> None:
+    """Check that the parameters of all calibrations are known, and mean the same.
+
+    Raises
+    ------
+    InputError
+        If one of them has no sigmas, or other effects or another conversion of its readings than
+        the first. The line names the calibration by its number and its campaign.
+    """
+    names = [effect.spec for effect in calibrations[0].model.effects]
+    for number, one in enumerate(calibrations, start=1):
+        own = [effect.spec for effect in one.model.effects]
+        if not np.isfinite(one.covariance).all():
+            why = "no sigmas; calibrate with more positions, or state the noise of the campaign"
+        elif one.content["nominal"] != calibrations[0].content["nominal"]:
+            why = (
+                "nominal: other scales or offsets from counts to m/s^2 than in the first "
+                "calibration, so their parameters do not mean the same; import both logs with the "
+                "same ones"
+            )
+        elif {*own} != {*names}:
+            why = (
+                f"effects: {comma_list(own)}, but {comma_list(names)} in the first calibration; "
+                "calibrate both campaigns with one `--model`"
+            )
+        else:
+            continue
+        raise InputError(f"calibration {number} ({one.content['campaign']}): {why}")
+
+
+def dates_of(
+    calibrations: Sequence[SensorCalibration],
+    dates: Sequence[str | datetime],
+    names: Sequence[str],
+) -> list[datetime]:
+    """Dates of calibrations that are given, or those of the campaigns; two may have none.
+
+    Parameters
+    ----------
+    calibrations : sequence of SensorCalibration
+    dates : sequence of str or datetime, of each calibration; none for those of the campaigns
+    names : sequence of str, what messages call the calibrations
+
+    Raises
+    ------
+    InputError
+        If a date is missing or wrong, or a calibration is given twice.
+    """
+    if dates and len(dates) != len(calibrations):
+        raise InputError(
+            f"{key('dates')}: {plural(len(dates), 'date')} for "
+            f"{plural(len(calibrations), 'calibration')}; give one for each, in their order, as "
+            "2026-03-01"
+        )
+    first: dict[bytes, str] = {}
+    stated = list[datetime]()
+    for i, (one, name) in enumerate(zip(calibrations, names, strict=True)):
+        # Noise never repeats: the same numbers are one campaign, whatever the file is called.
+        if (same := first.setdefault(one.parameters.tobytes(), name)) is not name:
+            raise InputError(f"{name}: has the numbers of {same}; each counts once")
+        date = dates[i] if dates else one.content["date"]
+        if date is None and len(calibrations) < MIN_COURSE:
+            return []
+        if date is None:
+            raise InputError(
+                f"{name}: date: missing; give `dates` for each calibration, or calibrate "
+                "again with `date` in the header of the campaign"
+            )
+        try:
+            stated.append(date if isinstance(date, datetime) else read_date(date))
+        except InputError as error:
+            raise InputError(f"{key('dates') if dates else f'{name}: date'}: {error}") from None
+    return stated
+
+
+def size_text(size: float, unit: str) -> str:
+    """Show a size to two digits."""
+    return f"{estimate(size, size, unit)[1]} {shown_unit(unit)}".strip()
+
+
+def change_text(row: Mapping[str, Any], value: float, sigma: float) -> str:
+    """Name a parameter with its change, or its rate, and the sigma of that; in SI."""
+    shown, uncertain = estimate(value, sigma, row["unit"])
+    sign, unit = "" if shown.startswith("−") else "+", shown_unit(row["unit"])
+    return f"{row['name']} by {sign}{shown} ± {uncertain} {unit}".strip()
