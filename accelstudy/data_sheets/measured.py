@@ -101,15 +101,18 @@ def with_history(sheet: DataSheet, path: str | Path) -> DataSheet:
     Raises
     ------
     InputError
-        If it is no history, or none of a bias.
+        If it is no history, none of a bias, or one of two calibrations.
     """
     document = _History.read(path)
     names = [parameter.name for parameter in get_effect("bias").parameters]
     biases = [parameter for parameter in document.parameters if parameter.name in names]
     if not biases:
         raise InputError(f"{path}: parameters: no bias; take calibrations whose model has one")
-    scatter = np.sqrt(np.mean([each.scatter.sd**2 for each in biases]))
-    rate = np.sqrt(np.mean([each.rate.per_year**2 + each.rate.sigma**2 for each in biases]))
+    rates, scatters = [each.rate for each in biases], [each.scatter for each in biases]
+    if None in rates or None in scatters:
+        raise InputError(f"{path}: parameters: no rates; take a history of three calibrations")
+    scatter = np.sqrt(np.mean([each.sd**2 for each in scatters if each]))
+    rate = np.sqrt(np.mean([each.per_year**2 + each.sigma**2 for each in rates if each]))
     return replace(
         sheet,
         repeatability=float(np.sqrt(2) * scatter),
@@ -130,8 +133,8 @@ class _Scatter(Part):
 
 class _Parameter(Part):
     name: str
-    rate: _Rate
-    scatter: _Scatter
+    rate: _Rate | None
+    scatter: _Scatter | None
 
 
 class _History(Document):
