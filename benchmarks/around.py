@@ -6,9 +6,9 @@ from pathlib import Path
 
 import numpy as np
 
+import accelstudy as acs
 from accelstudy.approaches import get_approach
 from accelstudy.campaign.format import write_campaign
-from accelstudy.campaign.simulated import CampaignSettings, simulate_campaign
 from accelstudy.diagnosis.pipeline import diagnose
 from log_memory import RATE, lines, write_log
 from problem import MODEL
@@ -24,9 +24,9 @@ LOG = 100
 READ = "import sys, pandas; pandas.read_csv(sys.argv[1])"
 
 
-def settings(effects, seed):
+def simulated(effects, seed):
     """36 positions with a robot, and all columns."""
-    return CampaignSettings(
+    return acs.simulate_campaign(
         seed=seed,
         scheme="fibonacci-30",
         repeat_first=6,
@@ -49,7 +49,7 @@ def diagnoses():
     """Diagnoses in a batch, beside least squares of the same campaigns."""
     loop, found = WAYS.get("scipy_jacobian")(get_approach("robot")), []
     for hidden, effects in HIDDEN.items():
-        campaigns = [simulate_campaign(settings(effects, seed)) for seed in range(CAMPAIGNS)]
+        campaigns = [simulated(effects, seed) for seed in range(CAMPAIGNS)]
         works = {
             "diagnosis": lambda campaigns=campaigns: [diagnose(c, MODEL) for c in campaigns],
             "fit": lambda c=campaigns[0]: [loop.solve_one(c.forces, c.angles) for _ in range(FITS)],
@@ -73,7 +73,7 @@ def commands():
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
         campaign, log = folder / "campaign", folder / "log.csv"
-        write_campaign(simulate_campaign(settings(HIDDEN["hysteresis"], 0))[0], campaign)
+        write_campaign(simulated(HIDDEN["hysteresis"], 0), campaign)
         write_log(log, lines(), 1e6 * LOG)
         pairs = {
             "`accelstudy diagnose`, hidden: hysteresis": (

@@ -1,11 +1,12 @@
 """How much memory and time a log takes: `accelstudy import` and `accelstudy apply` on CSV.
 
-    python benchmarks/log_memory.py [MB ...]
+    python benchmarks/log_memory.py [MILLIONS OF ROWS ...]
 
-Generates logs of these sizes (100 and 1000 MB if none is given) in a folder that is removed
-afterwards, runs both commands on each as processes of their own, and prints their wall time and
-their largest resident memory. `apply` writes four times what it reads, so the folder of
-temporary files (TMPDIR says which) needs six times the largest size.
+Generates logs of as many rows (4 and 16 millions if none is given; a row has 25 bytes) in a folder
+that is removed afterwards, runs both commands on each as processes of their own, and prints the
+time of their processor, their largest resident memory, and what of this each row takes more than in
+the log before. `apply` writes four times what it reads, so the folder of temporary files (TMPDIR
+says which) needs six times the largest size.
 """
 
 import sys
@@ -44,27 +45,31 @@ def write_log(path, session, size):
             file.write(session)
 
 
-def main(sizes):
+def main(millions):
     """Print a row for each command and size."""
     session = lines()
-    print(f"{'command':8}{'log / MB':>10}{'wall / s':>10}{'MB/s':>8}{'peak / MB':>11}")
-    for size in sizes:
+    a_row = len(session) / session.count(b"\n")
+    before = {"import": (0.0, 0.0), "apply": (0.0, 0.0)}
+    print(f"{'command':8}{'rows / 1e6':>12}{'cpu / s':>10}{'peak / MB':>11}{'B per row':>11}")
+    for million in millions:
         with tempfile.TemporaryDirectory() as name:
             folder = Path(name)
             log, out = folder / "log.csv", folder / "campaign"
-            write_log(log, session, 1e6 * size)
+            write_log(log, session, 1e6 * million * a_row)
             calibration = folder / "calibrated" / "calibration.json"
             commands = {
                 "import": (log, "--out", out, "--rate", RATE),
                 "apply": (calibration, log, "--out", folder / "leveled.csv"),
             }
             for command, arguments in commands.items():
-                wall, _, peak = took(*ACCELSTUDY, command, *arguments)
-                speed = log.stat().st_size / 1e6 / wall
-                print(f"{command:8}{size:10.0f}{wall:10.0f}{speed:8.1f}{peak:11.0f}", flush=True)
+                _, cpu, peak = took(*ACCELSTUDY, command, *arguments)
+                rows, less = before[command]
+                before[command] = log.stat().st_size / 1e6 / a_row, peak
+                each = (peak - less) / (before[command][0] - rows)
+                print(f"{command:8}{million:12g}{cpu:10.1f}{peak:11.0f}{each:11.0f}", flush=True)
                 if command == "import":
                     took(*ACCELSTUDY, "calibrate", out, "--out", calibration.parent)
 
 
 if __name__ == "__main__":
-    main([float(text) for text in sys.argv[1:]] or [100.0, 1000.0])
+    main([float(text) for text in sys.argv[1:]] or [4.0, 16.0])

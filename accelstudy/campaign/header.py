@@ -165,6 +165,11 @@ class LogLayout(ConfigSection):
         """Frame of the axes of the log."""
         return parse_frame(self.frame)
 
+    @property
+    def conversion(self) -> Conversion:
+        """Conversion of forces to m/s², in the axes of the log."""
+        return conversion_of(self.unit, self.scale, self.offset)
+
 
 def _not_zero(value: float) -> float:
     if value == 0:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable
 from dataclasses import dataclass
 from os import PathLike
 from pathlib import Path
@@ -12,23 +12,21 @@ from typing import TYPE_CHECKING, Any
 import pandas as pd
 
 from accelstudy.basics.arguments import as_sequence, path_of
-from accelstudy.basics.errors import InputError, key
+from accelstudy.basics.errors import InputError
 from accelstudy.basics.names import matches, natural
 from accelstudy.basics.progress import say, show, warn
 from accelstudy.basics.wording import plural
+from accelstudy.campaign.format import write_campaign
 from accelstudy.campaign.importing.bags import BAG_OF_FOLDER
-from accelstudy.campaign.importing.log import Log, keys_of, log_of
-from accelstudy.campaign.importing.logs import import_log, write_imported
+from accelstudy.campaign.importing.log import Log
+from accelstudy.campaign.importing.logs import import_log
 from accelstudy.campaign.importing.public import import_settings, public_file
-from accelstudy.campaign.importing.settings import ImportSettings, parse_settings, read_settings
-from accelstudy.campaign.reference_log import ReferenceLog, open_reference
+from accelstudy.campaign.importing.settings import settings_of
+from accelstudy.campaign.reference_log import reference_of
 from accelstudy.campaign.session import Campaign
 
 if TYPE_CHECKING:
-    from accelstudy.campaign.importing.detection import Holds
-
-OTHERS = ("reference_log", "reference", "reference_columns", "reference_offset", "settings")
-"""Keywords of an import that no file of settings has."""
+    from accelstudy.campaign.importing.holds import Holds
 
 
 @dataclass(frozen=True)
@@ -49,15 +47,9 @@ class LogImport:
     @classmethod
     def of(cls, log: Any, figure: bool = True, **given: Any) -> LogImport:
         """Import a log by the keywords of `find_holds`, checked."""
-        settings = settings_of(given)
-        reference = _reference(given)
-        if isinstance(log, Log | pd.DataFrame):
-            log = log_of(log, given)
-            layout = settings.model_dump(exclude_unset=True) | log.layout
-            files, settings = [log.file], parse_settings(layout)
-        else:
-            files = [*files_of(as_sequence(log))]
-        return cls(*import_log(files, settings, reference), figure)
+        settings = settings_of(given, log.given if isinstance(log, Log) else None)
+        logs = [log] if isinstance(log, Log | pd.DataFrame) else files_of(as_sequence(log))
+        return cls(*import_log(logs, settings, reference_of(given)), figure)
 
     @classmethod
     def of_public(cls, name: str, folder: str | PathLike[str]) -> LogImport:
@@ -66,8 +58,16 @@ class LogImport:
         return cls(*import_log(public_file(name, Path(folder)), settings))
 
     def write(self, folder: Path, place: Path) -> None:
-        """Write the folder of the campaign, with its figure."""
-        write_imported(self.campaign, self.holds, folder, self.figure)
+        """Write the folder of the campaign and, of a log, segmentation.svg and .png."""
+        write_campaign(self.campaign, folder)
+        if self.figure and (holds := self.holds) is not None:
+            # Matplotlib takes longer to import than a log of usual length to read.
+            from accelstudy.campaign.importing import segmentation_figure
+            from accelstudy.drawing.saving import save_all
+
+            offset = holds.means[0] - self.campaign.with_left_out.forces[0]
+            draw = {"segmentation": lambda: segmentation_figure.draw_segmentation(holds, offset)}
+            save_all(draw, folder)
 
     def tell(self, place: Path) -> None:
         """Print what was imported, with its warnings, and where to."""
@@ -79,12 +79,6 @@ class LogImport:
             say(f"figure: {place / 'segmentation.png'}")
         positions = plural(self.campaign.n_positions, "position")
         show(f"campaign: {place} ({positions})")
-
-
-def settings_of(given: Mapping[str, Any]) -> ImportSettings:
-    """Settings of a file, overlaid with those that were given as keywords."""
-    own = {k: value for k, value in given.items() if k not in OTHERS and value is not False}
-    return read_settings(given["settings"], *keys_of(own))
 
 
 def files_of(given: Iterable[str | PathLike[str]]) -> list[Path]:
@@ -115,18 +109,3 @@ def files_of(given: Iterable[str | PathLike[str]]) -> list[Path]:
     if twice:
         raise InputError(f"{twice[0]}: the file is given twice")
     return files
-
-
-def _reference(given: Mapping[str, Any]) -> ReferenceLog | None:
-    """Return the calibrated sensor on the same plate, if there is one."""
-    log, calibration, columns, offset = (given[name] for name in OTHERS[:-1])
-    of_log, of_calibration = key("reference_log"), key("reference")
-    if log is not None and calibration is not None:
-        return open_reference(log, calibration, columns, offset)
-    if log is not None:
-        raise InputError(f"{of_log}: give the calibration.json of that sensor by {of_calibration}")
-    if calibration is not None:
-        raise InputError(f"{of_calibration}: give the raw log of that sensor by {of_log}")
-    for name in (name for name in OTHERS[2:-1] if given[name] is not None):
-        raise InputError(f"{key(name)}: goes with {of_log} and {of_calibration}")
-    return None

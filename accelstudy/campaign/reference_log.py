@@ -11,14 +11,16 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from accelstudy.basics.errors import InputError
+from accelstudy.basics.errors import InputError, key
 from accelstudy.basics.units import GON
 from accelstudy.campaign.calibration.sensor_calibration import SensorCalibration, read_calibration
 from accelstudy.campaign.gross_errors.recognition import check_size
 from accelstudy.campaign.header import LogLayout
-from accelstudy.campaign.importing.detection import MAX_WANDER, Holds, reaches_range, scatter
+from accelstudy.campaign.importing.columns import AXES
+from accelstudy.campaign.importing.holds import MAX_WANDER, Holds, reaches_range, scatter
+from accelstudy.campaign.importing.log import open_log
 from accelstudy.campaign.importing.noise import hold_noise, sigma_text
-from accelstudy.campaign.importing.recording import AXES, Recording, read_log
+from accelstudy.campaign.importing.recording import Recording
 from accelstudy.campaign.importing.windows import Windows
 from accelstudy.campaign.reference import ReferenceSensor
 from accelstudy.files.validation import validate
@@ -27,6 +29,8 @@ from accelstudy.sensors.frames import Frame
 
 Array = NDArray[np.float64]
 
+KEYWORDS = ("reference_log", "reference", "reference_columns", "reference_offset")
+"""Keywords of an import by which a reference is given."""
 MIN_COVERAGE = 0.5
 """Share of a hold, below which the reference has not enough samples of it."""
 MIN_SAMPLES = 4
@@ -45,36 +49,39 @@ MIN_HOLDS = 8
 """Holds from which on it is checked that both sensors turn together."""
 
 
-def open_reference(
-    path: Path,
-    calibration: Path,
-    columns: Mapping[str, str] | None = None,
-    offset: float | None = None,
-) -> ReferenceLog:
-    """Open the log of a reference, which is read like that of its calibration.
+def reference_of(given: Mapping[str, Any]) -> ReferenceLog | None:
+    """Open the log of a reference as keywords say; without them there is none.
 
-    Parameters
-    ----------
-    path : its raw log
-    calibration : its calibration.json
-    columns : mapping of fx, fy, fz and time to columns, where the log is not like that of its
-        calibration
-    offset : float, s, to add to its times; None where both logs have one clock, or begin together
+    It is read like the log of its calibration, unless `reference_columns` says otherwise.
 
     Raises
     ------
     InputError
-        If its log cannot be read, or its calibration tells no angles with their sigmas.
+        If one of the keywords is missing, the log cannot be read, or the calibration tells no
+        angles with their sigmas.
     """
+    path, calibration, columns, offset = (given[name] for name in KEYWORDS)
+    of_log, of_calibration = key("reference_log"), key("reference")
+    if path is None:
+        if calibration is not None:
+            raise InputError(f"{of_calibration}: give the raw log of that sensor by {of_log}")
+        for name in (name for name in KEYWORDS if given[name] is not None):
+            raise InputError(f"{key(name)}: goes with {of_log} and {of_calibration}")
+        return None
+    if calibration is None:
+        raise InputError(f"{of_log}: give the calibration.json of that sensor by {of_calibration}")
     sensor, columns = usable_reference(calibration), dict(columns or {})
-    if unknown := [key for key in columns if key not in (*AXES, "time")]:
+    if unknown := [name for name in columns if name not in (*AXES, "time")]:
         raise InputError(
             f"`reference_columns`: {unknown[0]}: expected {', '.join(AXES)} and perhaps time"
         )
-    time = {"time": columns.pop("time")} if "time" in columns else {}
-    layout = validate(LogLayout, {**time, "columns": columns}, "`reference_columns`")
+    content = {"time": columns.pop("time", None), "columns": columns}
+    layout = validate(LogLayout, content, "`reference_columns`").model_dump(
+        include={name for name in content if content[name] not in (None, {})}
+    )
     try:
-        log = read_log(path, layout, like=sensor.usual_layout, conditions=("time",))
+        log = open_log(path, layout, like=sensor.usual_layout, wanted=("time",))
+        _ = log.layout
     except InputError as error:
         said = str(error).partition("; ")[0]
         raise InputError(
@@ -86,7 +93,7 @@ def open_reference(
 
 @dataclass(frozen=True)
 class ReferenceLog:
-    """The open log of a reference, and its calibration; see `open_reference`."""
+    """The open log of a reference, and its calibration; see `reference_of`."""
 
     path: Path
     calibration: SensorCalibration
@@ -196,7 +203,7 @@ class ReferenceLog:
         """Check that means of the reference, (n, 3), are as large as gravity."""
         first, where = self.log.first, f"`reference_log` {self.path}"
         try:
-            check_size(where, means, gravity, first.layout.unit, first.conversion)
+            check_size(where, means, gravity, first.layout.unit, first.layout.conversion)
         except InputError as error:
             raise InputError(
                 f"{str(error).split('; give')[0]}; it is read in the unit of the log of which "

@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import math
-from dataclasses import asdict, dataclass, fields
+from collections.abc import Mapping
+from dataclasses import fields
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -15,7 +17,6 @@ from accelstudy.approaches import get_approach
 from accelstudy.basics import bounds
 from accelstudy.basics.errors import InputError, UnknownNameError
 from accelstudy.basics.registry import WithSettings
-from accelstudy.basics.units import MGON, STANDARD_GRAVITY
 from accelstudy.campaign.session import Campaign
 from accelstudy.effects import Effect, get_effect
 from accelstudy.files.outputs import whole_file
@@ -33,69 +34,20 @@ STREAMS = ("sensor", "effects", "order", "noise", "sd")
 ORDERS = ("scheme", "random")
 
 
-@dataclass(frozen=True)
-class CampaignSettings:
-    """Settings of a simulated campaign, in SI apart from temperatures in °C.
+def simulate_campaign(given: Mapping[str, Any]) -> Campaign:
+    """Simulate a campaign, with all that was drawn as its truth.
 
     Parameters
     ----------
-    name : str
-    seed : int
-    scheme : str
-    repeats : int, how often the whole scheme is measured
-    repeat_first : int, number of first holds that are measured again at the end
-    order : "scheme" or "random", of the holds
-    approach : str, whether there is a robot
-    model : str, effects that every sensor has; their parameters are drawn, of `Effect.typical` size
-    effects : tuple of str, effects beyond the model, "warm_up(tau=400)" or with their parameters in
-        SI, "thermal_bias: 0.004, -0.002, 0.001"; one of an effect of the model replaces it
-    size : float, factor of the parameters of `effects` that are not given; they are as large as
-        the larger typical size, with random signs
-    noise_effects : tuple of str
-    sigma : float, m/s², of a position mean
-    sigma_known : bool, whether the campaign states it
-    robot_sigma : float, rad, of the robot's roll and pitch
-    gravity : float, m/s²
-    interval, temperature, temperature_order, vibration, yaw : as in `HoldPlan`
-    n_samples : int, samples per hold, optional; adds their sds
-    """
-
-    name: str = "simulated"
-    seed: int = 1
-    scheme: str = "mclaren-24"
-    repeats: int = 1
-    repeat_first: int = 0
-    order: str = "scheme"
-    approach: str = "robot"
-    model: str = "bias-scale-nonorthogonality"
-    effects: tuple[str, ...] = ()
-    size: float = 1.0
-    noise_effects: tuple[str, ...] = ()
-    sigma: float = 0.002
-    sigma_known: bool = True
-    robot_sigma: float = 3.2 * MGON
-    gravity: float = STANDARD_GRAVITY
-    interval: float | None = 60.0
-    temperature: tuple[float, float] | None = None
-    temperature_order: str = "linear"
-    vibration: tuple[float, float] | None = None
-    yaw: str = "none"
-    n_samples: int | None = None
-
-    @property
-    def holds(self) -> HoldPlan:
-        """Conditions of the holds."""
-        return HoldPlan(**{one.name: getattr(self, one.name) for one in fields(HoldPlan)})
-
-
-def simulate_campaign(settings: CampaignSettings) -> Campaign:
-    """Simulate a campaign, with all that was drawn as its truth.
+    given : mapping, all keywords of `accelstudy.simulate_campaign`, in SI
 
     Raises
     ------
     InputError
         If a name or a setting is unknown, or an effect needs a column that is not simulated.
     """
+    settings = SimpleNamespace(**given)
+    plan = HoldPlan(**{one.name: given[one.name] for one in fields(HoldPlan)})
     seeds = np.random.SeedSequence(settings.seed).spawn(len(STREAMS))
     rng = {name: np.random.default_rng(s) for name, s in zip(STREAMS, seeds, strict=True)}
     hidden = [_hidden_effect(text, settings.size, rng["effects"]) for text in settings.effects]
@@ -111,9 +63,9 @@ def simulate_campaign(settings: CampaignSettings) -> Campaign:
     noise_effects = [get_noise_effect(spec) for spec in settings.noise_effects]
 
     directions = _directions(settings, rng["order"])
-    hold = settings.holds.hold(len(directions))
+    hold = plan.hold(len(directions))
     for effect, _ in present:
-        if column := settings.holds.missing(effect):
+        if column := plan.missing(effect):
             raise InputError(
                 f"{PROVIDES[column]}: missing; the effect {effect.name!r} needs the {column} of "
                 "each hold"
@@ -156,7 +108,7 @@ def simulate_campaign(settings: CampaignSettings) -> Campaign:
             },
             "settings": {
                 key: list(value) if isinstance(value, tuple) else value
-                for key, value in asdict(settings).items()
+                for key, value in given.items()
             },
         },
     )
@@ -186,7 +138,7 @@ def _hidden_effect(text: str, size: float, rng: np.random.Generator) -> tuple[Ef
     return effect, values
 
 
-def _directions(settings: CampaignSettings, rng: np.random.Generator) -> Array:
+def _directions(settings: SimpleNamespace, rng: np.random.Generator) -> Array:
     """Directions of the holds in their order, (n, 3)."""
     once, first = get_scheme(settings.scheme).directions, settings.repeat_first
     bounds.POSITIONS.check_key("repeats: number of positions", settings.repeats * len(once) + first)

@@ -170,11 +170,8 @@ def apply(
         accelstudy apply calibrated/calibration.json calibration.csv --out leveled.csv
     """
     given: dict[str, Any] = {**locals()}
-    from accelstudy.campaign.importing.log import log_of
-
-    given["log"] = read = log_of(log, given)
     result = leveled(**given)
-    table = result.to_frame(read.table)
+    table = result.to_frame()
     table.attrs["warnings"] = list(result.warnings)
     return table
 
@@ -183,10 +180,9 @@ def leveled(calibration: Any, log: Any, **given: Any) -> LeveledLog:
     """Level a log by the keywords of `apply`, checked."""
     from accelstudy.campaign.calibration.leveling import level
     from accelstudy.campaign.calibration.sensor_calibration import sensor_of
-    from accelstudy.campaign.importing.log import log_of
+    from accelstudy.campaign.importing.settings import layout_of
 
-    read, sensor = log_of(log, given), sensor_of(calibration)
-    return level(sensor, read.file, read.layout, given["sigma"], given["start"])
+    return level(sensor_of(calibration), log, layout_of(given), given["sigma"], given["start"])
 
 
 @verb

@@ -54,12 +54,10 @@ def read_log(
         If there is no such file, or a value is wrong.
     """
     given = {**locals()}
-    from accelstudy.campaign.importing.formats import open_source
-    from accelstudy.campaign.importing.log import log_of
+    from accelstudy.campaign.importing.log import open_log
+    from accelstudy.campaign.importing.settings import layout_of
 
-    read = log_of(log, given)
-    open_source(read.file, read.layout.get("variable"))
-    return read
+    return open_log(log, layout_of(given))
 
 
 @verb
@@ -316,7 +314,6 @@ def simulate_campaign(
         accelstudy simulate-campaign --out blind --truth truth.yaml --effect "warm_up(tau=400)"
     """
     settings = {**locals()}
-    from accelstudy.campaign.simulated import CampaignSettings
     from accelstudy.campaign.simulated import simulate_campaign as simulate
 
-    return simulate(CampaignSettings(**{**settings, "name": name or "simulated"}))
+    return simulate({**settings, "name": name or "simulated"})

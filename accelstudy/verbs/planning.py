@@ -313,7 +313,7 @@ def data_sheet(
         accelstudy data-sheet log.csv --rate 100 --columns fx=0,fy=1,fz=2 --out my-sensor.yaml
     """
     given = {**locals()}
-    from accelstudy.campaign.log_import import settings_of
+    from accelstudy.campaign.importing.settings import settings_of
     from accelstudy.data_sheets.measured import sheet_of_campaign, sheet_of_log
 
     path = path_of("source", given.pop("source"))

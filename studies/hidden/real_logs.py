@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 from scipy import optimize, special
 
 from accelstudy.basics.errors import InputError
-from accelstudy.campaign.importing.detection import Holds
+from accelstudy.campaign.importing.holds import Holds
 from accelstudy.campaign.importing.logs import import_log
 from accelstudy.campaign.importing.settings import ImportSettings
 from accelstudy.campaign.importing.sources import Source

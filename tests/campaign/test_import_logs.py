@@ -15,7 +15,7 @@ from scipy.io import loadmat, savemat
 import accelstudy as acs
 from accelstudy.basics.errors import InputError
 from accelstudy.campaign.importing import text as texts
-from accelstudy.campaign.importing.detection import find_holds
+from accelstudy.campaign.importing.holds import find_holds
 from accelstudy.campaign.importing.settings import ImportSettings
 
 

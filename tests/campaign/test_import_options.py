@@ -13,10 +13,10 @@ from accelstudy.basics.units import GON, MGON
 from accelstudy.campaign.format import read_campaign
 from accelstudy.campaign.header import LogLayout
 from accelstudy.campaign.importing import segmentation_figure
-from accelstudy.campaign.importing.logs import import_log, write_imported
+from accelstudy.campaign.importing.logs import import_log
 from accelstudy.campaign.importing.public import import_settings, public_file
-from accelstudy.campaign.importing.settings import parse_settings
-from accelstudy.campaign.log_import import files_of
+from accelstudy.campaign.importing.settings import ImportSettings
+from accelstudy.campaign.log_import import LogImport, files_of
 from accelstudy.leveling.angles import specific_force
 from accelstudy.sensors.frames import parse_frame
 
@@ -126,9 +126,10 @@ def test_the_figure_shows_forces_without_the_offset_that_was_found(tmp_path, tur
 
     monkeypatch.setattr(segmentation_figure, "draw_segmentation", keep)
     raw = turned[0] / 0.001 + [33000, 33100, 32900]
-    settings = parse_settings({"rate_hz": RATE, "unit": "counts", "scale": 0.001})
+    settings = ImportSettings(rate_hz=RATE, unit="counts", scale=0.001)
+    imported, out = LogImport(*import_log(write(tmp_path, raw), settings)), tmp_path / "out"
     with drawn():
-        write_imported(*import_log(write(tmp_path, raw), settings), tmp_path / "out")
+        imported.write(out, out)
     low, high = figures[0].axes[0].dataLim.intervaly
     assert -30 < low < -5
     assert 5 < high < 30

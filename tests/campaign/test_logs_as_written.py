@@ -126,7 +126,7 @@ def test_names_with_units(names, factor, unit):
     assert np.median(norm) == pytest.approx(G, rel=2e-3)
     spelling = {"m/s^2": "m/s2", "g": "G", "mg": "milli-g"}[unit]
     layout = acs.read_log(log, unit=spelling, time_unit="sec").layout
-    assert (layout["unit"], layout["time_unit"]) == (unit, "s")
+    assert (layout.unit, layout.time_unit) == (unit, "s")
 
 
 def test_names_of_a_western_windows_are_read(tmp_path):
@@ -225,7 +225,7 @@ def test_a_table_in_memory_has_the_time_of_its_index(index):
     assert_timed(found(frame))
     by_place = acs.read_log(frame, columns={"fx": 0, "fy": 1, "fz": 2})
     assert len(acs.calibrate(found(by_place)).apply(by_place)) == N
-    assert "time" not in acs.read_log(frame, rate=HAND_RATE).layout
+    assert acs.read_log(frame, rate=HAND_RATE).layout.time is None
 
 
 # --- bags and flight logs ------------------------------------------------------------------------

@@ -9,8 +9,8 @@ from places import ROOT
 from scipy.stats import binom
 from usual import NINE, ROBOT, G
 
+import accelstudy as acs
 from accelstudy.adjustment.quality import solve
-from accelstudy.campaign.simulated import CampaignSettings, simulate_campaign
 from accelstudy.diagnosis.decision.posterior import Explanation
 from accelstudy.diagnosis.decision.problem import BaseFit, pose
 from accelstudy.diagnosis.evidence.candidates import Cause
@@ -35,7 +35,7 @@ SCHEMA = Draft202012Validator(
 
 def campaign(seed=1, **keys):
     """A simulated campaign with all columns; `keys` change the settings."""
-    return simulate_campaign(CampaignSettings(seed=seed, **{**FULL, **keys}))
+    return acs.simulate_campaign(seed=seed, **{**FULL, **keys})
 
 
 def some_holds(n, seed=3, **columns):

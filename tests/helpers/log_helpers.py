@@ -8,9 +8,10 @@ import pandas as pd
 import accelstudy as acs
 from accelstudy.basics.units import STANDARD_GRAVITY
 from accelstudy.campaign.header import LogLayout
-from accelstudy.campaign.importing import detection
-from accelstudy.campaign.importing.recording import Recording, read_log
-from accelstudy.campaign.importing.settings import parse_settings
+from accelstudy.campaign.importing import holds as detector
+from accelstudy.campaign.importing import log as logs
+from accelstudy.campaign.importing.recording import Recording
+from accelstudy.campaign.importing.settings import ImportSettings
 from accelstudy.files.validation import validate
 
 # --- a log of which the holds are known ----------------------------------------------------------
@@ -55,7 +56,8 @@ def write(folder, forces, time=None):
 
 def open_log(path, **layout):
     """Open a log as keys of its layout say."""
-    return Recording([read_log(path, validate(LogLayout, layout, "layout"))])
+    given = validate(LogLayout, layout, "layout").model_dump(exclude_unset=True, exclude_none=True)
+    return Recording([logs.open_log(path, given)])
 
 
 def opened(folder, forces, time=None, **options):
@@ -64,7 +66,7 @@ def opened(folder, forces, time=None, **options):
 
 
 def find_holds(log, **options):
-    return detection.find_holds(log, parse_settings(options))
+    return detector.find_holds(log, ImportSettings(**options))
 
 
 # --- 50 numbered rows ----------------------------------------------------------------------------

@@ -3,8 +3,8 @@
 import pytest
 import yaml
 
+import accelstudy as acs
 from accelstudy.basics.errors import InputError
-from accelstudy.campaign.simulated import CampaignSettings, simulate_campaign
 from accelstudy.effects import Effect, effect_names, get_effect
 from accelstudy.effects.base import expressions
 from accelstudy.sensors.models import MODELS, get_model
@@ -68,12 +68,9 @@ def test_formulas_are_those_of_the_effect():
 
 
 def test_a_campaign_of_a_composition_has_each_effect_once():
-    settings = CampaignSettings(
-        model=f"{NINE}+warm_up(tau=300)", effects=("warm_up(tau=500): 0.1, 0.2, 0.3",)
-    )
-    truth = simulate_campaign(settings).truth
+    effects = "warm_up(tau=500): 0.1, 0.2, 0.3"
+    truth = acs.simulate_campaign(model=f"{NINE}+warm_up(tau=300)", effects=effects).truth
     assert [e["name"] for e in truth["sensor"]] == ["bias", "scale", "nonorthogonality"]
     assert [e["name"] for e in truth["effects"]] == ["warm_up"]
-    twice = CampaignSettings(effects=("warm_up", "warm_up(tau=3)"))
     with pytest.raises(InputError, match="occur in two effects"):
-        simulate_campaign(twice)
+        acs.simulate_campaign(effects=("warm_up", "warm_up(tau=3)"))

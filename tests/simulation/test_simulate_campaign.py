@@ -6,14 +6,10 @@ import yaml
 from calling import refusal, succeed
 from scipy import stats
 
+from accelstudy import simulate_campaign as simulate
 from accelstudy.basics.units import MGON
 from accelstudy.campaign.format import read_campaign
-from accelstudy.campaign.simulated import CampaignSettings, simulate_campaign
 from accelstudy.effects import get_effect
-
-
-def simulate(**settings):
-    return simulate_campaign(CampaignSettings(**settings))
 
 
 def values(entries):

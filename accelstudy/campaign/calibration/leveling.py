@@ -27,13 +27,11 @@ from accelstudy.campaign.calibration.sensor_calibration import (
     SensorCalibration,
 )
 from accelstudy.campaign.gross_errors.recognition import check_size
-from accelstudy.campaign.header import LogLayout
-from accelstudy.campaign.importing.recording import AXES, CONDITIONS, SensorLog, read_log
-from accelstudy.campaign.importing.sources import LogFile
+from accelstudy.campaign.importing.columns import AXES, CONDITIONS
+from accelstudy.campaign.importing.log import AnyLog, Log, open_log
 from accelstudy.effects import HoldConditions, course_of_log
 from accelstudy.files.outputs import whole_file
 from accelstudy.files.tables import write_table
-from accelstudy.files.validation import validate
 from accelstudy.leveling.angles import near_pole
 from accelstudy.pages import render_lines
 
@@ -67,13 +65,13 @@ class LeveledLog:
 
     Attributes
     ----------
-    log : SensorLog, with the rows as they were read
+    log : Log, with the rows as they were read
     added : DataFrame of calibrated forces, roll and pitch and their standard deviations, and
         whether the row is near the pole
     warnings : tuple of str
     """
 
-    log: SensorLog
+    log: Log
     added: pd.DataFrame
     warnings: tuple[str, ...]
 
@@ -82,15 +80,9 @@ class LeveledLog:
         """Which rows have no calibrated force, (n,)."""
         return self.added.iloc[:, 0].isna().to_numpy()
 
-    def to_frame(self, frame: pd.DataFrame | None = None) -> pd.DataFrame:
-        """Return the log with the added columns.
-
-        Parameters
-        ----------
-        frame : DataFrame, optional
-            The rows of the log as their owner has them, whose index and columns stay as they are;
-            as they were read if omitted.
-        """
+    def to_frame(self) -> pd.DataFrame:
+        """Return the log with the added columns; a table in memory keeps its index and columns."""
+        frame = self.log.table
         frame = self.log.source.typed_table().to_pandas() if frame is None else frame
         return frame.assign(**{str(name): column.array for name, column in self.added.items()})
 
@@ -113,7 +105,7 @@ class LeveledLog:
 
 def level(
     calibration: SensorCalibration,
-    log: LogFile,
+    log: AnyLog,
     given: Mapping[str, Any] | None = None,
     sigma: float | None = None,
     start: float | None = None,
@@ -123,9 +115,9 @@ def level(
     Parameters
     ----------
     calibration : SensorCalibration
-    log : anything that `open_source` opens
+    log : path, table or Log
     given : mapping, optional
-        Keys of `LogLayout`, which count before the layout of the campaign's log; see `read_log`.
+        Keys of `LogLayout`, which count before the layout of the campaign's log.
     sigma : float, m/s², noise of a reading; that of the calibration if omitted
     start : float, s, from the start of the calibration session to the first row; 0 if omitted
 
@@ -135,10 +127,8 @@ def level(
         If the log cannot be read, lacks a column that an effect of the calibration needs, or is so
         far from gravity in most rows that it must be in another unit.
     """
-    given = dict(given or {})
-    read = _read(calibration, log, given)
-    _ = read.source.table  # before its numbers, so that the file is read once
-    forces, hold = read.forces, _conditions(read, start or 0.0)
+    read = _read(calibration, log, given or {})
+    given, forces, hold = read.given, read.forces, _conditions(read, start or 0.0)
     # What the user says of this log is right, whatever was wrong with the campaign.
     option_of = {"unit_error": "unit", "axis_error": "frame"}
     mended = calibration.content.get("mended") or {"error": "", "matrix": None}
@@ -149,7 +139,9 @@ def level(
     if not len(usable):
         first = f"; the first: {_reason(calibration, read, 0)}" if len(forces) else ""
         raise InputError(f"{read.path}: no row has three numbers{first}")
-    check_size(f"{read.path}", usable, calibration.gravity, read.layout.unit, read.conversion)
+    check_size(
+        f"{read.path}", usable, calibration.gravity, read.layout.unit, read.layout.conversion
+    )
     if sigma is not None:
         bounds.SIGMA_READING.check_key("`sigma`", sigma)
     noise = calibration.noise_of_reading if sigma is None else sigma
@@ -199,22 +191,18 @@ def _warnings(
     return tuple(warnings)
 
 
-def _read(calibration: SensorCalibration, log: LogFile, given: Mapping[str, Any]) -> SensorLog:
+def _read(calibration: SensorCalibration, log: AnyLog, given: Mapping[str, Any]) -> Log:
     """Open a log, and check that it has what the effects need."""
     needed = {condition for _, condition in calibration.model.needs}
     ranged = {key for key in CONDITIONS if KNOWN[key] in calibration.ranges}
-    read = read_log(
-        log,
-        validate(LogLayout, given, "options"),
-        like=calibration.usual_layout,
-        conditions=[key for key in OPTIONS if key in {*needed, *ranged, *given.get("columns", ())}],
-        untimed=True,
-    )
-    known = {*read.places, *(["time"] if read.layout.rate_hz is not None else [])}
+    read = open_log(log, given, like=calibration.usual_layout, untimed=True)
+    asked = {*needed, *ranged, *read.given.get("columns", ())}
+    read = replace(read, wanted=[key for key in OPTIONS if key in asked])
+    known = {*read.conditions, *(["time"] if read.timed else [])}
     for effect, condition in calibration.model.needs:
         if condition in known or condition.startswith("step_"):
             continue
-        where, how = f"{log}: the effect {effect} needs the {condition} of each row", OPTIONS
+        where, how = f"{read.path}: the effect {effect} needs the {condition} of each row", OPTIONS
         if condition not in how:
             raise InputError(
                 f"{where}, which no log has; a calibration without this effect can be applied"
@@ -223,10 +211,10 @@ def _read(calibration: SensorCalibration, log: LogFile, given: Mapping[str, Any]
     return read
 
 
-def _conditions(read: SensorLog, start: float) -> HoldConditions:
+def _conditions(read: Log, start: float) -> HoldConditions:
     """What is known of the rows besides the forces; the first is `start` s after the session's."""
-    names = [name for name in ("time", *CONDITIONS) if name in read.rows]
-    known: dict[str, Any] = {name: read.rows[name] for name in names}
+    names = [*(["time"] if read.timed else []), *read.conditions]
+    known: dict[str, Any] = {name: read.samples[name].to_numpy() for name in names}
     if "time" in known:
         known["time"] = start + known["time"]
         if "temperature" in known:
@@ -240,7 +228,7 @@ def _conditions(read: SensorLog, start: float) -> HoldConditions:
 
 def _level_rows(
     calibration: SensorCalibration,
-    log: SensorLog,
+    log: Log,
     forces: Array,
     hold: HoldConditions,
     noise: float,
@@ -289,7 +277,7 @@ def _beyond_ranges(
                    "low": low, "high": high}  # fmt: skip
 
 
-def _reason(calibration: SensorCalibration, log: SensorLog, row: int) -> str:
+def _reason(calibration: SensorCalibration, log: Log, row: int) -> str:
     """Say why a row is empty, and where it is."""
     needed = {*AXES, "time", *(condition for _, condition in calibration.model.needs)}
     lost = [key for key in log.lacking(row) if key in needed]

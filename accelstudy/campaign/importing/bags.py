@@ -98,7 +98,7 @@ def _source(
     si = {"unit": "m/s^2", "time_unit": "s"}
     layout = {"columns": columns, "time": "time", "frame": frame, **si}
     table = dict(zip(("time", *columns.values()), rows.T, strict=True))
-    return Source(path, pa.table(table), layout, warnings)
+    return Source(path, pa.table(table), layout, warnings=warnings)
 
 
 def _messages(reader: AnyReader, connections: Sequence[Connection]) -> Iterator[tuple[float, Any]]:

@@ -70,8 +70,8 @@ def import_settings(name: str) -> ImportSettings:
     return settings.model_copy(update={"name": name})
 
 
-def public_path(name: str, folder: str | Path) -> Path:
-    """Path of a public file, or of where it is to be if it is not there.
+def public_file(name: str, folder: str | Path) -> Path:
+    """Path of a public file; it is downloaded if it is missing.
 
     Parameters
     ----------
@@ -84,38 +84,22 @@ def public_path(name: str, folder: str | Path) -> Path:
     ------
     UnknownNameError
         If the registry has no such name.
-    """
-    import pooch
-
-    data = _public_data(name)
-    folder = Path(folder).expanduser()  # in a configuration no shell expands it
-    for path in sorted(folder.rglob(data.file_name)):
-        if path.is_file() and pooch.file_hash(str(path)) == data.sha256:
-            return path
-    return folder / name / data.file_name
-
-
-def public_file(name: str, folder: str | Path) -> Path:
-    """Path of a public file, as of `public_path`; the file is downloaded if it is missing.
-
-    Raises
-    ------
-    UnknownNameError
-        If the registry has no such name.
     InputError
         If the file cannot be downloaded, or is not the one that the registry knows.
     """
     import pooch
 
     pooch.get_logger().setLevel("WARNING")
-    data = _public_data(name)
+    data, folder = _public_data(name), Path(folder).expanduser()  # no shell expands a configuration
     try:
-        path = public_path(name, folder)
+        for path in sorted(folder.rglob(data.file_name)):
+            if path.is_file() and pooch.file_hash(str(path)) == data.sha256:
+                return path
         # As a stream, pooch would leave the connection open after an error.
         download = pooch.HTTPDownloader(timeout=TIMEOUT, stream=False)
-        checksum = f"sha256:{data.sha256}"
-        pooch.retrieve(data.url, checksum, path.name, path.parent, downloader=download)
-        return path
+        checksum, place = f"sha256:{data.sha256}", folder / name
+        pooch.retrieve(data.url, checksum, data.file_name, place, downloader=download)
+        return place / data.file_name
     except ValueError:
         raise InputError(
             f"{data.url}: has another sha256 than {data.sha256}: damaged on the way or changed at "

@@ -11,8 +11,8 @@ from matplotlib.ticker import NullLocator
 from numpy.typing import NDArray
 
 from accelstudy.basics.wording import plural
-from accelstudy.campaign.importing.detection import Holds
-from accelstudy.campaign.importing.recording import AXES
+from accelstudy.campaign.importing.columns import AXES
+from accelstudy.campaign.importing.holds import Holds
 from accelstudy.campaign.importing.windows import Windows
 from accelstudy.drawing.style import FULL, INK, new_figure
 

@@ -3,17 +3,16 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Mapping, Sequence
-from pathlib import Path
+from collections.abc import Mapping
 from typing import Annotated, Any, ClassVar, Literal, Self
 
 import numpy as np
 from pydantic import Field, model_validator
 
-from accelstudy.basics.errors import InputError
-from accelstudy.basics.units import STANDARD_GRAVITY
+from accelstudy.basics.arguments import tidy
+from accelstudy.basics.errors import InputError, key
+from accelstudy.basics.units import MGON, STANDARD_GRAVITY
 from accelstudy.campaign.header import LogLayout
-from accelstudy.campaign.importing.sources import LogFile
 from accelstudy.files.reading import overlay, read_layer
 from accelstudy.files.validation import (
     ConfigSection,
@@ -94,6 +93,17 @@ class ImportSettings(LogLayout):
         return self
 
     @property
+    def layout(self) -> dict[str, Any]:
+        """Keys of the layout of the log that were said."""
+        fields = {*LogLayout.model_fields}
+        return self.model_dump(include=fields, exclude_unset=True, exclude_none=True)
+
+    def with_layout(self, layout: LogLayout) -> Self:
+        """Return the settings with the layout that a log has."""
+        fields = LogLayout.model_fields
+        return self.model_copy(update={key: getattr(layout, key) for key in fields})
+
+    @property
     def full_range(self) -> float:
         """Range of the sensor, m/s²; infinite if it is unknown, or the offset of counts is."""
         if self.range_mps2 is None or (self.unit == "counts" and self.offset is None):
@@ -114,37 +124,51 @@ class ImportSettings(LogLayout):
         return reasons
 
 
-def parse_settings(
-    content: Mapping[str, Any],
-    source: str | Path = "settings",
-    names: Mapping[str, str] | None = None,
+KEYS = {
+    "gravity": "gravity.value_mps2",
+    "robot_sigma": "robot.angle_sigma_mgon",
+    "robot_unit": "robot.unit",
+}
+"""Keywords whose keys in a file have other names, of which some say a unit."""
+
+
+def settings_of(
+    given: Mapping[str, Any], layout: Mapping[str, Any] | None = None
 ) -> ImportSettings:
-    """Check settings; raise `InputError` with one line that names the source and the key.
+    """Settings of the file `settings`, overlaid with those of a layout, and these with keywords.
 
-    `names` are those of keys that are not from the source, see `validate`.
+    Raises
+    ------
+    InputError
+        One line that names the keyword, or the file and the key.
     """
-    return validate(ImportSettings, content, source, names=names)
+    path = given["settings"]
+    content, names = _keys_of(given, ImportSettings)
+    own = LogLayout.model_validate(layout or {}).model_dump(by_alias=True, exclude_unset=True)
+    below = overlay({} if path is None else read_layer(path), own)
+    return validate(ImportSettings, overlay(below, content), path or "settings", names=names)
 
 
-def read_settings(
-    path: str | Path | None,
-    given: Mapping[str, Any] | None = None,
-    names: Mapping[str, str] | None = None,
-) -> ImportSettings:
-    """Settings from a YAML file, overlaid with `given`, whose keys messages call by `names`."""
-    content = read_layer(path) if path is not None else {}
-    return parse_settings(overlay(content, given or {}), str(path or "settings"), names)
+def layout_of(given: Mapping[str, Any]) -> dict[str, Any]:
+    """Keys of a layout that keywords say, checked; other keywords do not count."""
+    content, names = _keys_of(given, LogLayout)
+    return validate(LogLayout, content, "log", names=names).model_dump(exclude_unset=True)
 
 
-def named_after(settings: ImportSettings, paths: Sequence[LogFile]) -> ImportSettings:
-    """Settings with a name for the campaign, if they have none.
-
-    It is the name of the file without endings, or of the folder of the files.
-    """
-    if settings.name:
-        return settings
-    path = Path(str(paths[0]))
-    name = Path(path.stem).stem if path.suffix == ".gz" else path.stem
-    if len(paths) > 1:
-        name = path.absolute().parent.name or path.stem
-    return settings.model_copy(update={"name": name})
+def _keys_of(
+    given: Mapping[str, Any], model: type[LogLayout]
+) -> tuple[dict[str, Any], dict[str, str]]:
+    """Content of a file that says the same as those keywords that a model has; keys with names."""
+    known = {field.alias or name for name, field in model.model_fields.items()}
+    content: dict[str, Any] = {}
+    names = {}
+    for name, value in given.items():
+        place = KEYS.get(name, name)
+        if place.partition(".")[0] not in known or value is None or value is False or value == ():
+            continue
+        names[place] = key(name)
+        block, _, inner = place.rpartition(".")
+        part = content.setdefault(block, {}) if block else content
+        value = tidy(value / MGON) if name == "robot_sigma" else value
+        part[inner] = list(value) if isinstance(value, tuple) else value
+    return content, names

@@ -1,23 +1,27 @@
-"""Tables of numbers as they stand in their files, MATLAB or in memory."""
+"""The raw table of a log: its columns as they are in its file, and their numbers."""
 
 from __future__ import annotations
 
 import re
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
+from contextlib import suppress
+from itertools import product
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pandas as pd
 import pyarrow as pa
+import pyarrow.compute as pc
 from numpy.typing import NDArray
 
 from accelstudy.basics.errors import InputError, UnknownNameError, printable
-from accelstudy.basics.wording import one_line
 from accelstudy.campaign.importing.names import layout_by_names
-from accelstudy.files.reading import readable
 
-_IS_NUMBER = re.compile("double|single|u?int[0-9]+")  # classes of MATLAB arrays
+_NUMBER = r"^[+-]?([0-9]+[.]?[0-9]*|[.][0-9]+)([eE]([+]?[0-9]{1,2}|-[0-2]?[0-9]{1,2}))?$"
+_LONG = 1e15  # from which on a whole number may have more digits than a float
+SAMPLED_CELLS = 1000
+"""Cells of a column among which the first that is not empty tells whether it has dates."""
 _CLOCK = r"\d{1,2}:\d\d(:\d\d([.,:]\d+)?)?"
 _ISO = r"\d{4}-?\d\d-?\d\d[T ]\d\d(:?\d\d.*)?"
 _DAY = r"(\d{4}(?P<of>[-/.])\d{1,2}(?P=of)\d{1,2}|\d{1,2}\.\d{1,2}\.\d{4})"
@@ -32,92 +36,88 @@ _AS_ISO = (
 
 
 class Source:
-    """A table of numbers in memory, as it is in its file.
+    """The raw table of a log, whatever file it was read from.
 
     Parameters
     ----------
     path : its file, or what messages call it
-    table : Table
+    table : Table; of a text its cells, which are read as numbers where numbers are asked for
     layout : mapping, what the format says of the keys of `LogLayout`; else, what the names say
+    notes : sequence of str, how the file was read
     warnings : sequence of str, what of the file could not be read
     named : bool, whether its columns have names, and not only places
+    locate : function that says where a row is in a text, and what its cell in a column holds
 
     Attributes
     ----------
     names : list of str, of the columns; their places, counted from 0, where the file has no names
     dates : set of int, places of columns of dates with times, of which the numbers are in ns
-    table : Table, by unique names
+    table : Table, by unique names: `column_0` … of a table without names
     """
-
-    warnings: Sequence[str] = ()
 
     def __init__(
         self,
         path: str | Path,
         table: pa.Table,
         layout: Mapping[str, Any] | None = None,
+        *,
+        notes: Sequence[str] = (),
         warnings: Sequence[str] = (),
         named: bool = True,
+        locate: Callable[[int, int], tuple[str, str]] | None = None,
     ) -> None:
-        self.path, self.warnings, self.named = Path(path), warnings, named
+        self.path, self.notes, self.warnings, self.named = Path(path), notes, warnings, named
         self.names = [printable(" ".join(name.split())) for name in table.column_names]
         self.layout = layout_by_names(self.names) if layout is None else layout
-        self.table = table.rename_columns(self.unique_names)
+        self._locate, unique = locate, [f"column_{place}" for place in range(len(self.names))]
+        if named:
+            before = [self.names[:place].count(name) for place, name in enumerate(self.names)]
+            unique = [
+                f"{name}.{n}" if n else name for name, n in zip(self.names, before, strict=True)
+            ]
+        self.table = table.rename_columns(unique)
         self.dates = {
             i
             for i, kind in enumerate(table.schema.types)
-            if pa.types.is_timestamp(kind) or (len(table) and is_stamp(str(table.column(i)[0])))
+            if pa.types.is_timestamp(kind) or is_stamp(_first_cell(table.column(i)))
         }
 
     def __str__(self) -> str:
         return str(self.path)
 
-    @property
-    def notes(self) -> Sequence[str]:
-        """How the file was read, in lines for people."""
-        return ()
-
-    @property
-    def unique_names(self) -> list[str]:
-        """Names of the columns, all different: `column_0` … of a table without names."""
-        if not self.named:
-            return [f"column_{place}" for place in range(len(self.names))]
-        before = [self.names[:place].count(name) for place, name in enumerate(self.names)]
-        return [f"{name}.{n}" if n else name for name, n in zip(self.names, before, strict=True)]
-
     def typed_table(self) -> pa.Table:
-        """The table, with numbers as such; only those of a text are not yet."""
-        return self.table
+        """Return the table in which columns that hold only numbers have them as such."""
+        if self._locate is None:
+            return self.table
+        return pa.table([*map(_typed, self.table.columns)], names=self.table.column_names)
 
-    def columns(self, places: Sequence[int]) -> list[pa.ChunkedArray]:
-        """Columns of which only the numbers matter."""
-        return [self.table.column(place) for place in places]
-
-    def numbers(self, places: Sequence[int]) -> list[NDArray[Any]]:
-        """Numbers of columns, NaN where there is none; dates and other whole numbers as integers.
+    def numbers(self, place: int) -> NDArray[Any]:
+        """Numbers of a column, NaN where there is none; dates and other whole numbers as integers.
 
         A time in ns since 1970 has more digits than a float.
         """
-        columns = zip(self.columns(places), places, strict=True)
-        numbers = [self._numbers(column, place) for column, place in columns]
-        pa.default_memory_pool().release_unused()
-        return numbers
-
-    def look_up(self, row: int, place: int) -> tuple[str, str]:
-        """Describe where a row is in the file, and what its cell in a column says."""
-        (values,) = self.numbers([place])
-        value = values[row] * (1e-9 if place in self.dates else 1)
-        return f"row {row + 1}", f"{value:g}"
-
-    def _numbers(self, column: pa.ChunkedArray, place: int) -> NDArray[Any]:
-        kind = column.type
+        column = self.table.column(place)
         if place in self.dates:
             return _nanoseconds(column.to_pandas())
+        if self._locate is not None:
+            column = _typed(column, exact=False)
+            if pa.types.is_string(column.type):
+                cells = pc.utf8_trim_whitespace(column)
+                cells = pc.if_else(pc.match_substring_regex(cells, _NUMBER), cells, None)
+                column = pc.replace_substring_regex(cells, r"^[+]", "").cast(pa.float64())
+        kind = column.type
         if not (pa.types.is_integer(kind) or pa.types.is_floating(kind)):
             raise InputError(f"{self.path}: column {self.names[place]} is {kind}, not numbers")
         if column.null_count:
             column = column.cast(pa.float64(), safe=False)
         return column.to_numpy()
+
+    def look_up(self, row: int, place: int) -> tuple[str, str]:
+        """Describe where a row is in the file, and what its cell in a column holds."""
+        if self._locate is not None:
+            return self._locate(row, place)
+        value = self.numbers(place)[row] * (1e-9 if place in self.dates else 1)
+        return f"row {row + 1}", f"{value:g}"
 
 
 LogFile = str | Path | Source
@@ -137,35 +137,35 @@ def chosen_of(path: Path, what: str, found: Collection[str], wanted: str | None)
     return next(iter(found)) if wanted is None else wanted
 
 
-def open_matlab(path: Path, variable: str | None = None) -> Source:
-    """Open a MATLAB file; it is read as a whole, since the format allows 2 GB at most."""
-    from scipy.io import loadmat, whosmat
-
-    try:
-        with readable(path):
-            arrays = {
-                name: shape
-                for name, shape, kind in whosmat(path)
-                if _IS_NUMBER.fullmatch(kind) and len(shape) == 2 and all(shape)
-            }
-            name = chosen_of(path, "array", arrays, variable)
-            array = loadmat(path, variable_names=[name])[name]
-    except InputError:
-        raise
-    except NotImplementedError:
-        raise InputError(f"{path}: a MATLAB 7.3 (HDF5) file; save it with -v7") from None
-    except Exception as error:  # SciPy's reader fails in many ways on a damaged file
-        raise InputError(f"{path}: not a whole MATLAB file ({one_line(error)})") from None
-    if np.iscomplexobj(array):
-        raise InputError(f"{path}: array {name} has complex numbers")
-    # An array with few rows and many columns has the samples in its columns.
-    columns = array if array.shape[0] < array.shape[1] else array.T
-    return Source(path, pa.table({str(i): c for i, c in enumerate(columns)}), named=False)
-
-
 def is_stamp(text: str) -> bool:
     """Whether a text is a date with a time, or a time of day, that the numbers of a table tell."""
     return _STAMP.fullmatch(text.strip()) is not None
+
+
+def _first_cell(column: pa.ChunkedArray) -> str:
+    """First cell of a column that is not empty, as text."""
+    firsts = (str(cell) for cell in column.slice(0, SAMPLED_CELLS).to_pylist() if cell is not None)
+    return next(filter(None, firsts), "")
+
+
+def _typed(cells: pa.ChunkedArray, exact: bool = True) -> pa.ChunkedArray:
+    """Cells of a text as numbers, empty ones as null, if all are; else as they are.
+
+    An exact number loses no digit.
+    """
+    for fills, kind in product((False, True), (pa.int64(), pa.float64())):
+        with suppress(pa.ArrowInvalid):
+            filled = pc.if_else(pc.equal(cells, ""), None, cells) if fills else cells
+            numbers = filled.cast(kind)
+            many = r"^\s*[+-]?[0-9]{16,}\s*$"
+            long = (
+                exact
+                and kind == pa.float64()
+                and pc.any(pc.greater_equal(pc.abs(numbers), _LONG)).as_py()
+            )
+            lost = long and pc.any(pc.match_substring_regex(cells, many)).as_py()
+            return cells if lost else numbers
+    return cells
 
 
 def _nanoseconds(column: pd.Series) -> NDArray[Any]:

@@ -1,4 +1,4 @@
-"""Numbers in lines of text: how its rows are written is told from them, and Arrow reads them."""
+"""Lines of text: how their rows are written is told from them, and Arrow reads them."""
 
 from __future__ import annotations
 
@@ -7,24 +7,22 @@ import gzip
 import re
 import zlib
 from collections import Counter
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from contextlib import suppress
-from functools import cached_property
+from functools import partial
 from io import BytesIO
 from itertools import islice, product, takewhile
 from pathlib import Path
-from typing import Any
 
 import pyarrow as pa
 import pyarrow.compute as pc
-from numpy.typing import NDArray
 from pyarrow import csv as arrow_csv
 
 from accelstudy.basics.errors import InputError, printable
 from accelstudy.basics.progress import stage
 from accelstudy.basics.wording import one_line, plural
-from accelstudy.campaign.importing.names import layout_by_names, unit_of_cell
-from accelstudy.campaign.importing.sources import Source, is_stamp
+from accelstudy.campaign.importing.names import unit_of_cell
+from accelstudy.campaign.importing.sources import Source
 from accelstudy.files.reading import readable
 
 GZIP = b"\x1f\x8b"
@@ -39,131 +37,50 @@ _LAYOUTS = ((",", "."), *product((";", "\t", "|", None), ".,"))
 _LABEL = re.compile(rb"(?<![\w.])([A-Za-z_]\w*)[ \t]*[:=][ \t]*(?=[-+.\d])")
 """Name of the number that follows, as in ``ax: 0.12`` or ``ax=0.12``."""
 _DECIMAL_COMMA = r"^([+-]?[0-9]*),([0-9]+([eE][+-]?[0-9]+)?)$"
-_NUMBER = r"^[+-]?([0-9]+[.]?[0-9]*|[.][0-9]+)([eE]([+]?[0-9]{1,2}|-[0-2]?[0-9]{1,2}))?$"
-_LONG = 1e15  # from which on a whole number may have more digits than a float
 
 
-class TextSource(Source):
-    """Numbers in lines of text, which are read when they are asked for.
+def read_text(path: Path) -> Source:
+    """Read a text; its cells stay as they are written, without blanks around them.
 
-    Attributes
-    ----------
-    names : list of str, from the header, or the places of the columns
-    named : bool, whether there is a header
-    path, dates, layout, notes, warnings : see `Source`
+    Raises
+    ------
+    InputError
+        If it is no table.
     """
+    content, labels = _read(path)
+    rows = _Rows.told_from(content, path)
+    names = labels if len(labels) == rows.width else rows.names
+    # Rows as they stand, then all of the usual width, then each one by itself.
+    for is_regular in (None, rows.are_regular, lambda _: False):
+        try:
+            columns = rows.parse(content, is_regular, path)
+            break
+        except pa.ArrowInvalid as error:
+            failed = InputError(f"{path}: no table: {one_line(error)}")
+    else:
+        raise failed
+    again = f"the header stands {plural(rows.repeated, 'more time')} between the rows"
+    return Source(
+        path,
+        pa.table(columns, names=names or [str(i) for i in range(rows.width)]),
+        notes=[*rows.notes, *([again] if rows.repeated else [])],
+        named=names is not None,
+        locate=partial(_look_up, path, rows),
+    )
 
-    def __init__(self, path: Path) -> None:
-        self.path, self._repeated = path, 0
-        self._content: bytes | None
-        self._content, labels = _read(path)
-        self._rows = _Rows.told_from(self._content, path)
-        names = labels if len(labels) == self._rows.width else self._rows.names
-        self.named = names is not None
-        self.names = names or [str(i) for i in range(self._rows.width)]
-        self.dates, self.layout = self._rows.dates, layout_by_names(self.names)
 
-    @property
-    def notes(self) -> list[str]:
-        """Lines about the text as a table; see `Source`."""
-        again = f"the header stands {plural(self._repeated, 'more time')} between the rows"
-        return [*self._rows.notes, *([again] if self._repeated else [])]
-
-    @cached_property
-    def table(self) -> pa.Table:
-        """Cells as text, without blanks around them; see `Source`."""
-        return pa.table(self._texts(range(self._rows.width)), names=self.unique_names)
-
-    def typed_table(self) -> pa.Table:
-        """Columns that hold only numbers as numbers; see `Source`."""
-        columns = [_numbers_if_all_are(cells) for cells in self.table.columns]
-        return pa.table(columns, names=self.table.column_names)
-
-    def columns(self, places: Sequence[int]) -> list[pa.ChunkedArray]:
-        """Columns as numbers where all cells are, else as text; see `Source`."""
-        read = "table" in vars(self)  # so that the file is read once
-        if not read and self._rows.decimal == "." and not self.dates & {*places}:
-            # Numbers at once take less time and memory than texts.
-            kinds = {p: pa.int64() if p in self._rows.long else pa.float64() for p in places}
-            with suppress(pa.ArrowInvalid):
-                return self._parse(self._lines(None), kinds)
-        texts = [self.table.column(place) for place in places] if read else self._texts(places)
-        return [_numbers_if_all_are(texts.pop(0)) for _ in places]
-
-    def _numbers(self, column: pa.ChunkedArray, place: int) -> NDArray[Any]:
-        if place not in self.dates and pa.types.is_string(column.type):
-            cells = pc.utf8_trim_whitespace(column)
-            cells = pc.if_else(pc.match_substring_regex(cells, _NUMBER), cells, None)
-            return pc.replace_substring_regex(cells, r"^[+]", "").cast(pa.float64()).to_numpy()
-        return super()._numbers(column, place)
-
-    def _texts(self, places: Sequence[int]) -> list[pa.ChunkedArray]:
-        """Cells of columns."""
-        # Rows as they stand, then all of the usual width, then each one by itself.
-        for is_regular in (None, self._rows.are_regular, lambda _: False):
-            try:
-                columns = self._parse(self._lines(is_regular), dict.fromkeys(places, pa.string()))
-                break
-            except pa.ArrowInvalid as error:
-                failed = InputError(f"{self.path}: no table: {one_line(error)}")
-        else:
-            raise failed
-        for i, cells in enumerate(columns):
-            if pc.any(pc.match_substring(cells, " ")).as_py():
-                columns[i] = pc.utf8_trim_whitespace(cells)
-            if self._rows.decimal == ",":
-                columns[i] = pc.replace_substring_regex(columns[i], _DECIMAL_COMMA, r"\1.\2")
-        return columns
-
-    def _parse(self, lines: pa.Buffer, kinds: Mapping[int, pa.DataType]) -> list[pa.ChunkedArray]:
-        """Columns of these places and types, of rows of which each has the usual width."""
-        names = [str(place) for place in range(self._rows.width)]
-        types = {names[place]: kind for place, kind in kinds.items()}
-        with stage(f"reading {self.path.name}"):
-            if not lines.size:
-                return pa.schema(types).empty_table().columns
-            return arrow_csv.read_csv(
-                pa.BufferReader(lines),
-                arrow_csv.ReadOptions(column_names=names, block_size=_BLOCK),
-                arrow_csv.ParseOptions(delimiter=self._rows.delimiter or " "),
-                arrow_csv.ConvertOptions(
-                    column_types=types, include_columns=[*types], strings_can_be_null=False
-                ),
-            ).columns
-
-    def _lines(self, are_regular: Callable[[bytes], bool] | None) -> pa.Buffer:
-        """Rows of the table in UTF-8; blocks of lines that are not regular are written anew."""
-        content, self._content = self._content or _read(self.path)[0], None
-        self._repeated = 0
-        lines = BytesIO(content)
-        for _ in range(self._rows.first):
-            lines.readline()
-        if are_regular is None and self._rows.are_clean(content, lines.tell()):
-            return pa.py_buffer(content).slice(lines.tell())
-        keep = are_regular or self._rows.are_clean
-        blocks = iter(lambda: lines.read(_BLOCK) + lines.readline(), b"")
-        return pa.py_buffer(b"".join(b if keep(b) else self._rewritten(b) for b in blocks))
-
-    def _rewritten(self, block: bytes) -> bytes:
-        """Lines of a text as rows of the usual width, without those that are no rows."""
-        lines = block.decode().split("\n")
-        self._repeated += sum(line.strip() in self._rows.header for line in lines)
-        rows = (self._rows.cells(line) for line in lines)
-        return "".join(self._rows.join(cells) for cells in rows if cells is not None).encode()
-
-    def look_up(self, row: int, place: int) -> tuple[str, str]:
-        """See `Source`; reads the file again, which only errors and warnings need."""
-        lines = enumerate(_read(self.path)[0].decode().split("\n"), 1)
-        below = ((n, self._rows.cells(line)) for n, line in lines if n > self._rows.first)
-        rows = ((n, cells) for n, cells in below if cells is not None)
-        number, cells = next(islice(rows, row, None), (0, []))
-        if not number:
-            return f"row {row + 1}", "unreadable"
-        if any(cells[self._rows.width :]):
-            return f"line {number}", f"{len(cells)} columns instead of {self._rows.width}"
-        if place >= len(cells):
-            return f"line {number}", "the line ends before it"
-        return f"line {number}", repr(cells[place][:40]) if cells[place] else "nothing"
+def _look_up(path: Path, rows: _Rows, row: int, place: int) -> tuple[str, str]:
+    """Find a cell; this reads the file again, which only errors and warnings need."""
+    lines = enumerate(_read(path)[0].decode().split("\n"), 1)
+    below = ((n, rows.cells(line)) for n, line in lines if n > rows.first)
+    number, cells = next(islice(((n, c) for n, c in below if c is not None), row, None), (0, []))
+    if not number:
+        return f"row {row + 1}", "unreadable"
+    if any(cells[rows.width :]):
+        return f"line {number}", f"{len(cells)} columns instead of {rows.width}"
+    if place >= len(cells):
+        return f"line {number}", "the line ends before it"
+    return f"line {number}", repr(cells[place][:40]) if cells[place] else "nothing"
 
 
 class _Rows:
@@ -181,8 +98,7 @@ class _Rows:
     names : list of str, from the header; None without one
     header : tuple of str, lines with names and units
     notes : list of str, how the text was taken
-    dates : set of int, places of columns of dates with times
-    long : set of int, places of columns of whole numbers with more digits than a float
+    repeated : int, headers between the rows
     """
 
     def __init__(self, lines: Sequence[str], delimiter: str | None, decimal: str) -> None:
@@ -214,9 +130,7 @@ class _Rows:
         self.names: list[str] | None = None
         self.notes: list[str] = []
         self._read_header(lines[: self.first], cells)
-        firsts = [next((row[i] for row in cells if row[i:] and row[i]), "") for i in range(usual)]
-        self.dates = {i for i, cell in enumerate(firsts) if is_stamp(cell)}
-        self.long = {i for i, cell in enumerate(firsts) if re.fullmatch("-?[0-9]{16,19}", cell)}
+        self.repeated = 0
         self._comment = next((c for c in "#%" for line in lines if line.lstrip()[:1] == c), "#")
         blanks = ("  ", "\t", "\n ", " \n") if delimiter is None else ()
         self._marks = [m.encode() for m in ('"', *self._comments, *self.header, *blanks)]
@@ -237,6 +151,43 @@ class _Rows:
         if not best.score:
             raise InputError(f"{path}: no line of numbers at the beginning")
         return best
+
+    def parse(
+        self, content: bytes, are_regular: Callable[[bytes], bool] | None, path: Path
+    ) -> list[pa.ChunkedArray]:
+        """Cells of the columns; blocks of lines that are not regular are written anew before."""
+        self.repeated = 0
+        lines = BytesIO(content)
+        for _ in range(self.first):
+            lines.readline()
+        start = lines.tell()
+        text = pa.py_buffer(content).slice(start)
+        if are_regular is not None or not self.are_clean(content, start):
+            keep = are_regular or self.are_clean
+            blocks = iter(lambda: lines.read(_BLOCK) + lines.readline(), b"")
+            text = pa.py_buffer(b"".join(b if keep(b) else self._rewritten(b) for b in blocks))
+        types = {str(place): pa.string() for place in range(self.width)}
+        if not text.size:
+            return pa.schema(types).empty_table().columns
+        with stage(f"reading {path.name}"):
+            columns = arrow_csv.read_csv(
+                pa.BufferReader(text),
+                arrow_csv.ReadOptions(column_names=[*types], block_size=_BLOCK),
+                arrow_csv.ParseOptions(delimiter=self.delimiter or " "),
+                arrow_csv.ConvertOptions(column_types=types, strings_can_be_null=False),
+            ).columns
+        if content.find(b" ", start) >= 0:
+            columns = [*map(pc.utf8_trim_whitespace, columns)]
+        if self.decimal == ",":
+            columns = [pc.replace_substring_regex(c, _DECIMAL_COMMA, r"\1.\2") for c in columns]
+        return columns
+
+    def _rewritten(self, block: bytes) -> bytes:
+        """Lines of a text as rows of the usual width, without those that are no rows."""
+        lines = block.decode().split("\n")
+        self.repeated += sum(line.strip() in self.header for line in lines)
+        rows = (self.cells(line) for line in lines)
+        return "".join(self.join(cells) for cells in rows if cells is not None).encode()
 
     def are_clean(self, content: bytes, start: int = 0) -> bool:
         """Whether there are, from a place on, no marks that Arrow takes for something else."""
@@ -401,18 +352,3 @@ def _is_number(cell: str, decimal: str) -> bool:
 def _most_frequent(counts: Iterable[int]) -> int:
     """Most frequent of some numbers, the largest of equally frequent ones."""
     return max(Counter(counts).items(), key=lambda item: item[::-1])[0]
-
-
-def _numbers_if_all_are(cells: pa.ChunkedArray) -> pa.ChunkedArray:
-    """Cells as numbers, empty ones as null, if that loses no digit of any; as text otherwise."""
-    empty = pc.equal(cells, "")
-    filled = pc.if_else(empty, None, cells) if pc.any(empty).as_py() else cells
-    with suppress(pa.ArrowInvalid):
-        return filled.cast(pa.int64())
-    with suppress(pa.ArrowInvalid):
-        numbers = filled.cast(pa.float64())
-        long = pc.any(pc.greater_equal(pc.abs(numbers), _LONG)).as_py()
-        digits = r"^\s*[+-]?[0-9]{16,}\s*$"
-        if not (long and pc.any(pc.match_substring_regex(cells, digits)).as_py()):
-            return numbers
-    return cells

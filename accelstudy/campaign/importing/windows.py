@@ -7,7 +7,6 @@ variances of the three axes in a window with a threshold, which comes from the d
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import cached_property
 
 import numpy as np
 import pandas as pd
@@ -35,7 +34,8 @@ same number all the time: that of noise of 0.4 steps."""
 
 _TOGETHER = 2**16
 """Windows that are worked out together: what a processor keeps at hand is small."""
-_BINS = np.linspace(-40.0, 40.0, 4001)  # decades of variance
+_DECADES, _PER_DECADE = 40, 50
+"""Bins of the histogram of variances: decades on both sides of 1 (m/s²)², and bins of each."""
 
 
 @dataclass(frozen=True)
@@ -61,31 +61,33 @@ class Windows:
     A channel that does not change in a window is frozen, unless the steps in which it is read
     explain it: then no window has less noise than that of rounding.
 
-    Attributes
+    Parameters
     ----------
     log : Recording
     width : int, samples of a window; odd
-    gaps : int, gaps in time within a recording
-    centred : (n,) bool array, where there is a window
-    frozen : float, share of the windows in which a channel is frozen
+
+    Attributes
+    ----------
+    log, width
     steps : (3,) array, m/s², in which the axes are read; 0 where there are none
+    rounding : float, m/s², noise of a window by rounding alone
     variance : (n,) array, (m/s²)², norm of the variances of the axes in the window about each
         sample; NaN about those too near to a gap or an end for a window, and if it is frozen
+    centred : (n,) bool array, where there is a window
+    warnings : list of str
 
     Raises
     ------
     InputError
-        If the log cannot be read, or is too short for a window.
+        If the log is too short for a window.
     """
 
     def __init__(self, log: Recording, width: int) -> None:
-        self.log, self.width = log, width
-        half = width // 2
+        self.log, self.width, half = log, width, width // 2
         jumps = np.diff(log.time) > GAP_RATIO * log.step
-        firsts = np.cumsum(log.lengths)[:-1] - 1
-        jumps[firsts] = False
-        self.gaps = int(jumps.sum())
-        jumps[firsts] = True
+        joints = np.cumsum(log.lengths)[:-1] - 1
+        gaps = int(jumps.sum() - jumps[joints].sum())
+        jumps[joints] = True
         piece = np.concatenate([[0], np.cumsum(jumps)])
         self.variance, frozen = window_variance(log.forces, width)
         self.variance[half : len(piece) - half][piece[2 * half :] != piece[: -2 * half]] = np.nan
@@ -96,12 +98,21 @@ class Windows:
                 f"{log.unit_hint()}"
             )
         self.steps = np.array([step_in(force[self.centred]) for force in log.forces.T])
-        self.frozen = 0.0
-        if self._rounding_explains_the_least():
+        self.rounding = float(np.sqrt(np.linalg.norm(self.steps**2 / 12)))
+        self.warnings = [f"{plural(gaps, 'gap')} in time; no hold spans one"] if gaps else []
+        floor = _noise_floor(self.variance) if self.rounding else 0.0
+        # If all windows that change are motion, nothing else explains that others do not.
+        if (
+            0 < floor <= MAX_COARSE_RATIO * self.rounding
+            or floor > MAX_REST_NOISE * STANDARD_GRAVITY
+        ):
             np.maximum(self.variance, self.rounding**2, out=self.variance)
-        else:
-            self.frozen = np.sum(frozen & self.centred) / self.centred.sum()
+        elif (share := np.sum(frozen & self.centred) / self.centred.sum()) > 0:
             self.variance[frozen] = np.nan
+            self.warnings.append(
+                f"a channel does not change over a window in {100 * share:.2g} % of the log; left "
+                "out"
+            )
 
     @classmethod
     def lasting(cls, log: Recording, seconds: float | None = None) -> Windows:
@@ -112,7 +123,7 @@ class Windows:
         InputError
             If their samples are too few for a variance, or so many that the rate must be wrong.
         """
-        window = usual_window(log) if seconds is None else seconds
+        window = seconds or usual_window(log)
         samples = window / log.step
         if not MIN_SAMPLES <= samples <= MAX_SAMPLES:
             raise InputError(
@@ -121,43 +132,6 @@ class Windows:
                 f"{log.unit_hint() or '; is the rate (`rate`) right?'}"
             )
         return cls(log, round(samples) | 1)
-
-    @property
-    def rounding(self) -> float:
-        """Noise of a window by rounding alone, m/s²."""
-        return float(np.sqrt(np.linalg.norm(self.steps**2 / 12)))
-
-    def _rounding_explains_the_least(self) -> bool:
-        """Whether the steps explain that a channel at rest does not change over a window.
-
-        If all windows that change are motion, nothing else explains it either.
-        """
-        if not self.rounding > 0:
-            return False
-        noise = _noise_floor(self.variance)
-        most = MAX_COARSE_RATIO * self.rounding
-        return noise <= most or noise > MAX_REST_NOISE * STANDARD_GRAVITY
-
-    @cached_property
-    def extremes(self) -> Array:
-        """Two lowest and two highest readings, the outermost first, (2, 2, 3)."""
-        ends = np.empty((2, 2, 3))
-        for axis, force in enumerate(self.log.forces.T):
-            read = force[self.centred]
-            low, high = read.min(), read.max()
-            ends[0, :, axis] = low, np.min(read, where=read > low, initial=np.inf)
-            ends[1, :, axis] = high, np.max(read, where=read < high, initial=-np.inf)
-        return ends
-
-    def warnings(self) -> list[str]:
-        """What a user should know of the log."""
-        said = []
-        if self.gaps:
-            said.append(f"{plural(self.gaps, 'gap')} in time; no hold spans one")
-        if self.frozen:
-            share = f"{100 * self.frozen:.2g} %"
-            said.append(f"a channel does not change over a window in {share} of the log; left out")
-        return said
 
     def threshold(self, given: float | None = None) -> Threshold:
         """Threshold that a person chose, m/s², or a multiple of the noise floor.
@@ -192,9 +166,11 @@ def window_variance(forces: Array, width: int) -> tuple[Array, NDArray[np.bool_]
         middle = slice(first + width // 2, first + width // 2 + count)
         of_axes = pd.DataFrame(block).rolling(width).var(ddof=0).to_numpy()[ends]
         variance[middle] = np.sqrt(np.sum(of_axes**2, axis=1))
-        # Rounding may hide a variance of zero, so changes are counted.
-        changes = np.cumsum(np.diff(block, axis=0, prepend=block[:1]) != 0, axis=0)
-        constant[middle] = np.any(changes[ends] == changes[:count], axis=1)
+        # Rounding may hide a variance of zero, so readings that do not change are counted.
+        same = np.diff(block, axis=0, prepend=block[:1]) == 0
+        if np.count_nonzero(same, axis=0).max() >= width:
+            alike = np.cumsum(same, axis=0)
+            constant[middle] = np.any(alike[ends] - alike[:count] == width - 1, axis=1)
     return variance, constant
 
 
@@ -202,31 +178,25 @@ def _noise_floor(variance: Array) -> float:
     """Noise around which windows at rest crowd, m/s²; infinite without a window that changes.
 
     Otsu's method finds the valley between rest and motion in the histogram of the logarithmic
-    variances. At rest they crowd around one value; in motion they spread over decades.
+    variances: it divides them into two classes with the largest variance between these. At rest
+    they crowd around one value; in motion they spread over decades.
     """
     decades = np.log10(variance, where=variance > 0, out=np.full(len(variance), np.nan))
-    # Bins of equal width, which numpy finds faster than those of an array.
-    counts, _ = np.histogram(decades, len(_BINS) - 1, (_BINS[0], _BINS[-1]))
+    bins = 2 * _DECADES * _PER_DECADE
+    counts, edges = np.histogram(decades, bins, (-_DECADES, _DECADES))
     if not counts.any():
         return np.inf
-    middle = (_BINS[:-1] + _BINS[1:]) / 2
-    quiet = np.where(middle <= _otsu(counts, middle), counts, 0)
-    # Smoothed over a tenth of a decade, so that a short log with few windows has a peak, too.
-    mode = middle[np.argmax(np.convolve(quiet, np.ones(5), "same"))]
-    crowd = np.where(np.abs(middle - mode) <= np.log10(2), counts, 0)
-    return float(np.sqrt(10.0 ** middle[np.searchsorted(np.cumsum(crowd), crowd.sum() / 2)]))
-
-
-def _otsu(counts: NDArray[np.int_], middle: Array) -> float:
-    """Value that divides a histogram into two classes with the largest variance between them."""
-    below = np.cumsum(counts)[:-1].astype(float)
+    middle = (edges[:-1] + edges[1:]) / 2
+    below, moment = np.cumsum(counts)[:-1].astype(float), np.cumsum(counts * middle)
     above = counts.sum() - below
-    moment = np.cumsum(counts * middle)
     # An empty class has no mean, and no weight.
     low = moment[:-1] / np.maximum(below, 1)
     high = (moment[-1] - moment[:-1]) / np.maximum(above, 1)
     between = below * above * (high - low) ** 2
-    if not between.max() > 0:
-        return float(middle[np.argmax(counts)])
     best = np.flatnonzero(between >= between.max() * (1 - 1e-9))
-    return float(middle[best[len(best) // 2]])
+    valley = middle[best[len(best) // 2]] if between.max() > 0 else middle[np.argmax(counts)]
+    quiet = np.where(middle <= valley, counts, 0)
+    # Smoothed over a tenth of a decade, so that a short log with few windows has a peak, too.
+    mode = middle[np.argmax(np.convolve(quiet, np.ones(5), "same"))]
+    crowd = np.where(np.abs(middle - mode) <= np.log10(2), counts, 0)
+    return float(np.sqrt(10.0 ** middle[np.searchsorted(np.cumsum(crowd), crowd.sum() / 2)]))

@@ -19,8 +19,13 @@ from accelstudy.basics.errors import InputError
 from accelstudy.basics.units import STANDARD_GRAVITY
 from accelstudy.basics.wording import plural, short_list
 from accelstudy.campaign.importing.allan import MIN_DIFFERENCES
-from accelstudy.campaign.importing.noise import HoldNoise, hold_noise, noise_before_rounding
-from accelstudy.campaign.importing.recording import AXES, SDS, Recording
+from accelstudy.campaign.importing.columns import AXES, SDS
+from accelstudy.campaign.importing.noise import (
+    HoldNoise,
+    hold_noise,
+    noise_before_rounding,
+)
+from accelstudy.campaign.importing.recording import Recording
 from accelstudy.campaign.importing.settings import ImportSettings
 from accelstudy.campaign.importing.windows import (
     MAX_REST_NOISE,
@@ -86,7 +91,7 @@ class Holds:
     @property
     def means(self) -> Array:
         """Mean specific forces, (n, 3), m/s²."""
-        return np.column_stack([self.table[axis] for axis in AXES])
+        return self.table[[*AXES]].to_numpy()
 
     @property
     def radius(self) -> float:
@@ -108,29 +113,7 @@ class Holds:
         )
 
 
-def hold_table(log: Recording, holds: Mapping[int, slice]) -> pd.DataFrame:
-    """Table of holds by their numbers, from the samples of each.
-
-    Its columns are start and end (first sample, and the one after the last), t0 and t1 (times of
-    the first and of the last sample, s), n (samples), fx … (means, m/s²), sd_fx … (standard
-    deviations of the samples), and, as far as the log has them, the mean temperature, °C, and the
-    rms vibration, m/s²; NaN where nothing was measured.
-    """
-    rows = []
-    for hold in holds.values():
-        forces, time = log.forces[hold], log.time[hold]
-        row = {"start": hold.start, "end": hold.stop, "t0": time[0], "t1": time[-1]}
-        row |= {"n": len(forces), **dict(zip(AXES, forces.mean(axis=0), strict=True))}
-        row |= dict(zip(SDS, forces.std(axis=0, ddof=1), strict=True))
-        for name, values in log.conditions.items():
-            power = 2 if name == "vibration" else 1
-            known = values[hold][np.isfinite(values[hold])] ** power
-            row[name] = known.mean() ** (1 / power) if len(known) else np.nan
-        rows.append(row)
-    return pd.DataFrame(rows, index=[*holds])
-
-
-# --- Runs at rest, and blocks --------------------------------------------------------------------
+# --- Runs at rest --------------------------------------------------------------------------------
 
 
 def find_holds(log: Recording, settings: ImportSettings, one_each: bool = False) -> Holds:
@@ -151,30 +134,26 @@ def find_holds(log: Recording, settings: ImportSettings, one_each: bool = False)
         If the log is shorter than a window, nothing in it is at rest, or the sensor was never
         still.
     """
-    seconds = settings.window_s or usual_window(log)
-    windows = Windows.lasting(log, seconds)
+    windows = Windows.lasting(log, settings.window_s)
     threshold = windows.threshold(settings.threshold_mps2)
-    runs, too_short = _runs_at_rest(windows, threshold.sd, seconds, settings)
-    full = find_saturated(windows, runs, settings.full_range)
+    runs, too_short = _runs_at_rest(windows, threshold.sd, settings)
     # A sensor that turns slowly is nearly still in each window, yet has no constant attitude: its
     # force changes over the run by more than within each of them.
     turns = [scatter(log.forces[run]) > MAX_WANDER * threshold.sd for run in runs]
     reasons = {i: TURNS for i, turning in enumerate(turns) if turning}
-    reasons |= {i: SATURATED for i, saturated in enumerate(full) if saturated}
+    reasons |= dict.fromkeys(find_saturated(windows, runs, settings.full_range), SATURATED)
     numbers = dict(enumerate(range(len(runs)), 1))
     if one_each:
-        part = log.part
-        last_is_best = sorted(
-            numbers.values(), key=lambda i: (i not in reasons, runs[i].stop - runs[i].start)
-        )
+        part, lengths = log.part, [run.stop - run.start for run in runs]
+        last_is_best = sorted(range(len(runs)), key=lambda i: (i not in reasons, lengths[i]))
         numbers = dict(sorted({int(part[runs[i].start]) + 1: i for i in last_is_best}.items()))
     left_out = {n: reasons[i] for n, i in numbers.items() if i in reasons}
     why = Counter(left_out.values())
     lost = [f"{plural(count, 'hold')} left out: {reason}" for reason, count in why.items()]
-    warnings = [*windows.warnings(), *lost, *too_short]
+    warnings = [*windows.warnings, *lost, *too_short]
     if len(left_out) == len(numbers):
         if TURNS in why:
-            raise _never_still(windows, "it turns slowly in all that looks like a hold", seconds)
+            raise _never_still(windows, "it turns slowly in all that looks like a hold", settings)
         raise InputError(
             f"{log.path}: no static hold of {settings.shortest_s:g} s or more (a window "
             f"is at rest up to {threshold.sd:.3g} m/s²)" + "".join(f"; {w}" for w in warnings)
@@ -184,7 +163,7 @@ def find_holds(log: Recording, settings: ImportSettings, one_each: bool = False)
 
 
 def _runs_at_rest(
-    windows: Windows, limit: float, seconds: float, settings: ImportSettings
+    windows: Windows, limit: float, settings: ImportSettings
 ) -> tuple[list[slice], list[str]]:
     """Samples that are at rest for long enough, in windows up to an sd in m/s².
 
@@ -197,21 +176,23 @@ def _runs_at_rest(
     rests = edges + np.array([cut, -cut])
     lengths = np.diff(rests)[:, 0]
     runs = [slice(first, end) for first, end in rests[lengths >= least].tolist()]
-    short = (lengths >= MIN_REST) & (lengths < least)
-    if not short.any():
+    short = lengths[(lengths >= MIN_REST) & (lengths < least)]
+    if not len(short):
         return runs, []
-    rests_s = (lengths[short] + 2 * cut + windows.width) * step
-    lost = seconds + 2 * settings.trim_s
-    spans = sorted({f"{rests_s.min():.1f}", f"{rests_s.max():.1f}"}, key=float)
-    left = (float(rests_s.min()) - lost) * (1 + 1e-9)
+    lost = (settings.window_s or usual_window(windows.log)) + 2 * settings.trim_s
+    spans = (np.sort(short)[[0, -1]] + 2 * cut + windows.width) * step
+    left = (spans[0] - lost) * (1 + 1e-9)
     digit = 10.0 ** np.floor(np.log10(left))
-    several = len(rests_s) > 1
+    said = " to ".join(dict.fromkeys(f"{span:.1f}" for span in spans))
+    are, them = ("are", "them") if len(short) > 1 else ("is", "it")
     return runs, [
-        f"{plural(len(rests_s), 'rest')} of {' to '.join(spans)} s {'are' if several else 'is'} "
-        f"no hold: it takes {lost + shortest:.3g} s, of which {lost:.3g} s at its ends do not "
-        f"count; `shortest` {digit * np.floor(left / digit):g} (now {shortest:g}) takes "
-        f"{'them' if several else 'it'}"
+        f"{plural(len(short), 'rest')} of {said} s {are} no hold: it takes {lost + shortest:.3g} s,"
+        f" of which {lost:.3g} s at its ends do not count; `shortest` "
+        f"{digit * np.floor(left / digit):g} (now {shortest:g}) takes {them}"
     ]
+
+
+# --- Blocks --------------------------------------------------------------------------------------
 
 
 def find_blocks(log: Recording, settings: ImportSettings) -> Holds:
@@ -227,7 +208,7 @@ def find_blocks(log: Recording, settings: ImportSettings) -> Holds:
     """
     block = log.part
     if (size := settings.block) is not None:
-        row, total = log.row, len(log.first.forces)
+        row, total = log.samples.index.to_numpy(), len(log.first.lost)
         fewer = total // size * size
         if len(row) and row[-1] >= fewer:  # a note at the end is no sample
             raise InputError(
@@ -237,15 +218,15 @@ def find_blocks(log: Recording, settings: ImportSettings) -> Holds:
             )
         block = row // size  # a row that is left out counts as well
     edges = [*np.flatnonzero(np.diff(block, prepend=-1)).tolist(), len(block)]
-    all_blocks = {int(block[i]) + 1: slice(i, end) for i, end in pairwise(edges)}
-    least = size or min(each.stop - each.start for each in all_blocks.values())
+    blocks = {int(block[i]) + 1: slice(i, end) for i, end in pairwise(edges)}
+    least = size or int(np.diff(edges).min())
     if least < PARTS:
         raise InputError(f"{log.path}: {least} samples; a position has at least {PARTS}")
     # Blocks of which most is left out are no positions, which the report says.
-    blocks = {n: each for n, each in all_blocks.items() if each.stop - each.start >= PARTS}
-    windows = Windows(log, (least // 2) | 1)
+    blocks = {n: each for n, each in blocks.items() if each.stop - each.start >= PARTS}
+    windows, numbers = Windows(log, (least // 2) | 1), [*blocks]
     full = find_saturated(windows, [*blocks.values()], settings.full_range)
-    left_out = {n: SATURATED for n, f in zip(blocks, full, strict=True) if f}
+    left_out = {numbers[i]: SATURATED for i in full}
     scatters = {
         n: scatter(np.array([p.mean(axis=0) for p in np.array_split(log.forces[each], PARTS)]))
         for n, each in blocks.items()
@@ -253,18 +234,21 @@ def find_blocks(log: Recording, settings: ImportSettings) -> Holds:
     }
     if not scatters:
         raise InputError(f"{log.path}: the sensor is saturated in all blocks of {least} samples")
-    threshold = windows.threshold(settings.threshold_mps2) if settings.threshold_mps2 else None
-    if threshold is None:
+    if settings.threshold_mps2:
+        threshold = windows.threshold(settings.threshold_mps2)
+    else:
         # Rounding hides the scatter of a coarse sensor.
-        usual = max(
-            float(np.median([*scatters.values()])), THRESHOLD_FACTOR / MAX_TREMOR * windows.rounding
-        )
+        hidden = THRESHOLD_FACTOR / MAX_TREMOR * windows.rounding
+        usual = max(float(np.median([*scatters.values()])), hidden)
         reason = f"{MAX_TREMOR:g} times the scatter of the {PARTS} parts of a typical block"
         threshold = Threshold(MAX_TREMOR * usual, usual, reason)
     for number, each in scatters.items():
         if each > threshold.sd:
             left_out[number] = f"the sensor moves: its parts scatter by {each:.2g} m/s²"
-    return _holds_of(windows, threshold, blocks, windows.warnings(), settings, left_out, least)
+    return _holds_of(windows, threshold, blocks, windows.warnings, settings, left_out, least)
+
+
+# --- What is no measurement ----------------------------------------------------------------------
 
 
 def scatter(forces: Array) -> float:
@@ -272,8 +256,8 @@ def scatter(forces: Array) -> float:
     return float(np.sqrt(np.linalg.norm(forces.var(axis=0, ddof=1))))
 
 
-def find_saturated(windows: Windows, holds: Sequence[slice], full_range: float) -> list[bool]:
-    """Tell whether samples of holds lie at the sensor's range or, if it is unknown, at the extreme.
+def find_saturated(windows: Windows, holds: Sequence[slice], full_range: float) -> list[int]:
+    """Find holds with samples at the sensor's range or, if it is unknown, at the extreme.
 
     In a hold of n samples of which none lies beyond the last step, the mean may be so high that
     `MAX_BEYOND` of them were expected there. Those above the last edge but one are as many as the
@@ -284,26 +268,36 @@ def find_saturated(windows: Windows, holds: Sequence[slice], full_range: float) 
     windows : Windows
     holds : sequence of slices of the samples of the log
     full_range : float, m/s², the sensor measures ± this; infinite if unknown
+
+    Returns
+    -------
+    list of int, places of the holds in their sequence
     """
-    forces = [windows.log.forces[hold] for hold in holds]
+    forces, step = [windows.log.forces[hold] for hold in holds], windows.steps
     if np.isfinite(full_range) or not forces:
         # The largest reading of a converter is a step less than its range.
-        return [reaches_range(each, full_range - windows.steps.max()) for each in forces]
-    step, extremes = windows.steps, windows.extremes[:, :, None, :]
+        limit = full_range - step.max()
+        return [i for i, each in enumerate(forces) if reaches_range(each, limit)]
+    ends, inner = np.empty((2, 2, 3))
+    for axis, force in enumerate(windows.log.forces.T):
+        read = force[windows.centred]
+        low, high = ends[:, axis] = read.min(), read.max()
+        inner[0, axis] = np.min(read, where=read > low, initial=np.inf)
+        inner[1, axis] = np.max(read, where=read < high, initial=-np.inf)
     noise = noise_before_rounding(step, np.median([f.std(axis=0, ddof=1) for f in forces], axis=0))
     with np.errstate(divide="ignore", invalid="ignore"):
         steps = np.where(step > 0, step / noise, 0.0)
     steps[noise == 0] = np.inf  # every reading is the same in most holds
-    result, normal = [], NormalDist()  # scipy.special takes long to import
-    for each in forces:
+    normal, found = NormalDist(), []  # scipy.special takes long to import
+    for i, each in enumerate(forces):
         n = len(each)
-        end, beside = np.sum(each == extremes, axis=2).transpose(1, 0, 2)
+        at_end, beside = (np.sum(each == x[:, None], axis=1) for x in (ends, inner))
         middle = normal.inv_cdf(min(MAX_BEYOND / n, 0.5))
         share = np.array([normal.cdf(middle + step) for step in steps])
         explained = n * share + MIN_WITHIN * np.sqrt(n * share * (1 - share))
-        piled = (end > np.maximum(MAX_SATURATED_SHARE * n, explained)) & (end > beside)
-        result.append(bool(np.any(piled)))
-    return result
+        if np.any((at_end > np.maximum(MAX_SATURATED_SHARE * n, explained)) & (at_end > beside)):
+            found.append(i)
+    return found
 
 
 def reaches_range(forces: Array, full_range: float) -> bool:
@@ -313,14 +307,36 @@ def reaches_range(forces: Array, full_range: float) -> bool:
     return bool(np.any(beyond.sum(axis=0) > MAX_SATURATED_SHARE * len(forces)))
 
 
-# --- What a person says of them ------------------------------------------------------------------
+# --- The table of holds --------------------------------------------------------------------------
+
+
+def hold_table(log: Recording, holds: Mapping[int, slice]) -> pd.DataFrame:
+    """Table of holds by their numbers, from the samples of each.
+
+    Its columns are start and end (first sample, and the one after the last), t0 and t1 (times of
+    the first and of the last sample, s), n (samples), fx … (means, m/s²), sd_fx … (standard
+    deviations of the samples), and, as far as the log has them, the mean temperature, °C, and the
+    rms vibration, m/s²; NaN where nothing was measured.
+    """
+    rows = []
+    for hold in holds.values():
+        forces, time = log.forces[hold], log.time[hold]
+        row = {"start": hold.start, "end": hold.stop, "t0": time[0], "t1": time[-1]}
+        row |= {"n": len(forces), **dict(zip(AXES, forces.mean(axis=0), strict=True))}
+        row |= dict(zip(SDS, forces.std(axis=0, ddof=1), strict=True))
+        for name in log.conditions:
+            power = 2 if name == "vibration" else 1
+            known = log.samples[name].iloc[hold].dropna().to_numpy() ** power
+            row[name] = known.mean() ** (1 / power) if len(known) else np.nan
+        rows.append(row)
+    return pd.DataFrame(rows, index=[*holds])
 
 
 def _holds_of(
     windows: Windows,
     threshold: Threshold,
     holds: Mapping[int, slice],
-    warnings: list[str],
+    warnings: Sequence[str],
     settings: ImportSettings,
     left_out: Mapping[int, str],
     size: int | None = None,
@@ -332,8 +348,7 @@ def _holds_of(
     InputError
         If there is no such hold, a person leaves all of them out, or the sensor was never still.
     """
-    log, table = windows.log, hold_table(windows.log, holds)
-    left_out = {**left_out, **settings.left_out}
+    log, left_out = windows.log, {**left_out, **settings.left_out}
     for number in sorted(left_out.keys() - holds.keys()):
         there = short_list([str(each) for each in holds])
         raise InputError(f"exclude: there is no hold {number}; they are {there}")
@@ -342,13 +357,14 @@ def _holds_of(
         why = f"exclude: no {'hold' if size is None else 'block'} is left"
         raise InputError(f"{log.path}: {why} ({next(iter(left_out.values()))})")
     noise = hold_noise(used, log.step, windows.steps)
+    table = hold_table(log, holds)
     found = Holds(windows, threshold, table, left_out, noise, tuple(warnings), size)
     if _moves(found):
         why = (
             f"what looks like rest varies by {threshold.floor:.3g} m/s², slowly like a hand, not "
             "like the noise of a sensor"
         )
-        raise _never_still(windows, why, settings.window_s or usual_window(log), size)
+        raise _never_still(windows, why, settings, size)
     return found
 
 
@@ -370,13 +386,16 @@ def _moves(holds: Holds) -> bool:
     return bool(np.max(curve.pooled[reliable] / white) > SLOW_RATIO)
 
 
-def _never_still(windows: Windows, why: str, seconds: float, size: int | None = None) -> InputError:
+def _never_still(
+    windows: Windows, why: str, settings: ImportSettings, size: int | None = None
+) -> InputError:
     if size is not None:
         return InputError(
             f"{windows.log.path}: blocks of {size} samples are no positions: {why}; is the number "
             "of samples (`block`) right, or does a file hold a move?"
         )
     least = np.sqrt(np.nanquantile(windows.variance, 0.01))
+    seconds = settings.window_s or usual_window(windows.log)
     return InputError(
         f"{windows.log.path}: the sensor was never still: {why}; the quietest hundredth of its "
         f"windows of {seconds:g} s varies by {least:.3g} m/s². Lay it down for some seconds in "
