@@ -89,10 +89,6 @@ class Information:
         """Whether all parameters are determined."""
         return rank_of(self.rows)[0] == self.rows.shape[1]
 
-    def undetermined(self, estimated: Sequence[int] | NDArray[np.int_]) -> NDArray[np.bool_]:
-        """Which of the estimated parameters are not determined."""
-        return rank_of(self.rows[:, estimated])[2]
-
     def errors(
         self,
         estimated: Sequence[int] | NDArray[np.int_],

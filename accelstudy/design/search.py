@@ -98,7 +98,9 @@ class Search:
         InputError
             If no attitude is allowed, the allowed ones do not determine the model, or are too few.
         """
-        self._check(n)
+        if not len(self.candidates):
+            limits = ", ".join(self.allowed.constraints) or "no constraints"
+            raise InputError(f"no attitude is left of {self.allowed.text} with {limits}")
         each = [self._from_start(n, start) for start in range(1, starts + 1)]
         best = each[first_best([self.value(one) for one in each], DESIGN_TOLERANCE)]
         directions = round_directions(self._join(best))
@@ -183,19 +185,6 @@ class Search:
         normal = self.task.normal(directions)
         least = float(np.tensordot(self._informations, self.criterion.gradient(normal), 2).min())
         return self.criterion.bound(self.task.prior, normal, len(directions), least)
-
-    def _check(self, n: int) -> None:
-        """Raise `InputError` if no attitude is allowed, or n positions have too few conditions."""
-        if not len(self.candidates):
-            limits = ", ".join(self.allowed.constraints) or "no constraints"
-            raise InputError(f"no attitude is left of {self.allowed.text} with {limits}")
-        unknown = len(self.task.names)
-        rank_before = int(np.linalg.matrix_rank(self.task.prior))
-        least = -(-(unknown - rank_before) // self.task.approach.n_conditions)
-        if n < least:
-            raise InputError(
-                f"{n} positions do not determine {unknown} parameters; at least {least} are needed"
-            )
 
 
 def round_directions(directions: Array) -> Array:

@@ -82,7 +82,6 @@ Rate = Annotated[float, *bounds_of(bounds.RATE)]
 Replicates = Annotated[int, *bounds_of(bounds.REPLICATES)]
 Attitudes = Annotated[int, *bounds_of(bounds.ATTITUDES)]
 BaseSamples = Annotated[int, *bounds_of(bounds.BASE_SAMPLES), AfterValidator(_power_of_two)]
-Resamples = Annotated[int, *bounds_of(bounds.RESAMPLES)]
 Seed = Annotated[int, *bounds_of(bounds.SEED)]
 
 

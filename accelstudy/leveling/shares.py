@@ -19,8 +19,8 @@ of correlated inputs.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
-from itertools import product
+from collections.abc import Sequence
+from itertools import combinations, product
 from math import factorial
 
 import numpy as np
@@ -45,8 +45,6 @@ SHARE_TOLERANCE = 0.02
 
 With the sds of 100 000 calibrations the shares are uncertain by 0.6 %.
 """
-CHUNK = 1024
-"""Sets of inputs that are computed at once."""
 SINGULAR = 1e-12
 """Eigenvalues of a correlation matrix below this share of the largest one count as zero."""
 
@@ -185,7 +183,8 @@ def _divided(covariance: Array, with_output: Array) -> Array:
     sd = np.sqrt(np.diagonal(covariance))
     correlation, g = covariance / np.outer(sd, sd), (with_output / sd).T
     gained = np.zeros_like(g)
-    for size, members in _sets(p):
+    for size in range(1, p + 1):
+        members = np.array([*combinations(range(p), size)])
         inside = np.zeros((len(members), p))
         np.put_along_axis(inside, members, 1.0, axis=1)
         of_members = g[members]
@@ -196,14 +195,3 @@ def _divided(covariance: Array, with_output: Array) -> Array:
         misses = factorial(size) * factorial(p - size - 1) / factorial(p) if size < p else 0.0
         gained += (inside * joins - (1 - inside) * misses).T @ value
     return gained.T
-
-
-def _sets(p: int) -> Iterator[tuple[int, NDArray[np.int64]]]:
-    """All sets of p inputs but the empty one: their size, and their members by chunks."""
-    for start in range(1, 2**p, CHUNK):
-        numbers = np.arange(start, min(start + CHUNK, 2**p))
-        inside = (numbers[:, None] >> np.arange(p)) & 1
-        sizes = inside.sum(axis=1)
-        for size in np.unique(sizes):
-            _, members = np.nonzero(inside[sizes == size])
-            yield int(size), members.reshape(-1, size)

@@ -50,7 +50,7 @@ OF_RIG = ("base_tilt", "encoder_scale", "encoder_offset", "gravity_error")
 FAMILY = "fibonacci"
 SIZES = (*range(4, 25), 27, *range(30, 61, 5), *range(70, 101, 10), *range(120, 401, 40))
 """Family of evenly spread positions, and the sizes of it that are tried. They show about how many
-positions are needed; `accelstudy.planning.fewest` seeks the fewest."""
+positions are needed; `accelstudy.planning.answer` seeks the fewest."""
 LEAST_REDUNDANCY = 0.25
 """Least share of redundant conditions; with fewer a wrong position would not be noticed."""
 
@@ -71,8 +71,6 @@ class Candidate:
     search : Search that found its positions, from so many random sets; None of a known scheme
     starts : int
     simulated : SimulatedTilt or None
-    fewer : SimulatedTilt or None, of the best positions of which there is one less, and which miss
-        the target
     """
 
     equipment: Equipment
@@ -85,7 +83,6 @@ class Candidate:
     search: Search | None = field(default=None, compare=False)
     starts: int = 0
     simulated: SimulatedTilt | None = field(default=None, compare=False)
-    fewer: SimulatedTilt | None = field(default=None, compare=False)
 
     @property
     def seconds(self) -> float:

@@ -17,22 +17,11 @@ from numpy.typing import NDArray
 
 from accelstudy import __version__
 from accelstudy.approaches import get_approach
-from accelstudy.basics import bounds
+from accelstudy.basics import bounds, units
 from accelstudy.basics.arguments import path_of, tidy
 from accelstudy.basics.errors import InputError, key
 from accelstudy.basics.names import path_name
 from accelstudy.basics.progress import say, show, stage
-from accelstudy.basics.units import (
-    GON,
-    MGON,
-    angle_note,
-    angles_in,
-    attitude_unit,
-    display_unit,
-    to_attitude,
-    to_display,
-    to_recorded,
-)
 from accelstudy.design.criteria import get_criterion, rms_tilt
 from accelstudy.design.order import field_order
 from accelstudy.design.search import Search, round_directions
@@ -41,7 +30,7 @@ from accelstudy.design.task import Task
 from accelstudy.drawing.style import FULL
 from accelstudy.files.outputs import new_file
 from accelstudy.pages.result import Result
-from accelstudy.schemes import get_scheme, is_scheme_file
+from accelstudy.schemes import get_scheme
 from accelstudy.sensors.models import get_model
 from accelstudy.simulation.sessions import Noise
 
@@ -109,16 +98,16 @@ class Design(Result):
         """How it was made and how good it is, as plain data in the units of files."""
         search, asked = self.search, self.asked
         task, noise = search.task, search.task.noise
-        with angles_in("gon"):
+        with units.angles_in("gon"):
             constraints = search.allowed.constraints
         content = {
             "version": __version__,
             "criterion": f"{search.criterion.name}: {search.criterion.text}",
             "model": task.model.name,
             "approach": task.approach.name,
-            "tilt_range_gon": tidy(task.tilt_range / GON, 6),
+            "tilt_range_gon": tidy(task.tilt_range / units.GON, 6),
             "sigma_mps2": tidy(noise.sigma_force, 6),
-            "robot_sigma_mgon": tidy(noise.sigma_angle / MGON, 6),
+            "robot_sigma_mgon": tidy(noise.sigma_angle / units.MGON, 6),
             "gravity_sigma_mps2": tidy(noise.sigma_gravity, 6),
             "attitudes": search.allowed.text,
             "constraints": constraints,
@@ -126,21 +115,22 @@ class Design(Result):
             "seed": search.seed,
             "starts": asked["starts"],
             "efficiency": tidy(self.efficiency, 6),
-            "rms_roll_mgon": tidy(self.rms[0] / MGON, 6),
-            "rms_pitch_mgon": tidy(self.rms[1] / MGON, 6),
+            "rms_roll_mgon": tidy(self.rms[0] / units.MGON, 6),
+            "rms_pitch_mgon": tidy(self.rms[1] / units.MGON, 6),
         }
         return {k: v for k, v in content.items() if v not in (None, [], 0.0) and v == v}
 
     def to_frame(self) -> pd.DataFrame:
         """Return the positions, with angles in the unit that the names say."""
-        unit, cosines = attitude_unit(), np.sum(self.directions[1:] * self.directions[:-1], axis=1)
-        roll, pitch = to_attitude(angles_to(self.directions)).T
+        unit = units.attitude_unit()
+        cosines = np.sum(self.directions[1:] * self.directions[:-1], axis=1)
+        roll, pitch = units.to_attitude(angles_to(self.directions)).T
         return pd.DataFrame(
             {
                 "position": range(1, len(roll) + 1),
                 f"roll/{unit}": roll.round(2) + 0.0,
                 f"pitch/{unit}": pitch.round(2) + 0.0,
-                f"turn/{unit}": to_attitude([np.nan, *np.arccos(np.clip(cosines, -1, 1))]),
+                f"turn/{unit}": units.to_attitude([np.nan, *np.arccos(np.clip(cosines, -1, 1))]),
             }
         )
 
@@ -172,11 +162,11 @@ class Design(Result):
     def lines(self) -> Iterable[str]:
         """What the design brings, in sentences."""
         task, reference = self.search.task, get_scheme(REFERENCE)
-        noise = f"noise {to_display(task.noise.sigma_force, 'm/s^2'):.3g} mm/s² per position"
+        noise = f"noise {units.to_display(task.noise.sigma_force, 'm/s^2'):.3g} mm/s² per position"
         if task.approach.uses_angles:
-            robot = to_display(task.noise.sigma_angle, "rad")
-            noise += f" and robot noise {robot:.3g} {display_unit('rad')}"
-        tilt = f"{to_attitude(task.tilt_range):.4g} {attitude_unit()}"
+            robot = units.to_display(task.noise.sigma_angle, "rad")
+            noise += f" and robot noise {robot:.3g} {units.display_unit('rad')}"
+        tilt = f"{units.to_attitude(task.tilt_range):.4g} {units.attitude_unit()}"
         after = f" after {self.asked['after']}" if self.asked["after"] else ""
         rms = rms_tilt(task, reference.directions)
         theirs = _both(rms) if np.isfinite(rms).all() else "do not determine the model"
@@ -190,7 +180,7 @@ class Design(Result):
                 f"{len(self.directions)} allowed positions can reach "
                 f"({self.search.criterion.text})."
             )
-        yield f"Noise of a leveled reading comes on top. {angle_note()}."
+        yield f"Noise of a leveled reading comes on top. {units.angle_note()}."
 
     def save(self, path: str | PathLike[str], *, force: bool = False) -> None:
         """Write the YAML file of a scheme.
@@ -200,14 +190,8 @@ class Design(Result):
         path : path, ending in .yaml
         force : bool, whether to replace a file that is there
         """
-        place, attitudes, after = (
-            path_of("path", path),
-            self.asked["attitudes"],
-            self.asked["after"],
-        )
-        read = [attitudes] if attitudes.endswith(".csv") else []
-        read += [after] if after and is_scheme_file(after) else []
-        with new_scheme(place, read, force) as file:
+        place = path_of("path", path)
+        with new_scheme(place, [], force) as file:
             self.write(file, place)
 
     def write(self, file: Path, place: Path) -> None:
@@ -234,7 +218,7 @@ def search_for(
 ) -> Search:
     """Search that the keywords of `accelstudy.find_positions` ask for, checked."""
     bounds.SIGMA_FORCE.check_key(key("sigma"), sigma)
-    bounds.SIGMA_ANGLE.check_key(key("robot_sigma"), robot_sigma / MGON)
+    bounds.SIGMA_ANGLE.check_key(key("robot_sigma"), robot_sigma / units.MGON)
     bounds.SIGMA_GRAVITY.check_key(key("gravity_sigma"), gravity_sigma)
     task = Task(
         get_model(model),
@@ -257,8 +241,8 @@ def new_scheme(out: Path, inputs: Iterable[str | Path], force: bool) -> Iterator
 
 
 def _both(rms: Any) -> str:
-    unit = display_unit("rad")
-    roll, pitch = to_display(rms, "rad")
+    unit = units.display_unit("rad")
+    roll, pitch = units.to_display(rms, "rad")
     return f"roll {roll:.2f} {unit}, pitch {pitch:.2f} {unit}"
 
 
@@ -274,7 +258,7 @@ def write_scheme(
     directions : (n, 3) array of unit vectors
     made : mapping, plain data: how it was made, and how good it is
     """
-    angles = (to_recorded(angles_to(directions), "rad") / 1000).round(3) + 0.0
+    angles = (units.to_recorded(angles_to(directions), "rad") / 1000).round(3) + 0.0
     content = {
         "scheme": name,
         "title": title,

@@ -29,7 +29,7 @@ IN_SIGHT = 8.0
 def draw_plan(ax: Axes, plan: Plan) -> None:
     """Draw all candidates, the front of the best, and the simulated candidates of the table."""
     question, target = plan.question, float(to_display(plan.question.target, "rad"))
-    share, ordered = question.confidence, sort_by_time(plan.candidates)
+    share, ordered = question.confidence, sort_by_time([*plan.candidates, *plan.ranked])
     left = to_display(np.array([question.accuracy(c.tilt) for c in ordered]), "rad")
     minutes = np.array([c.seconds / 60 for c in ordered])
     for equipment in question.equipment:

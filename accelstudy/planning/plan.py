@@ -8,8 +8,6 @@ from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-import numpy as np
-
 from accelstudy.basics.errors import InputError
 from accelstudy.basics.progress import say, show
 from accelstudy.basics.units import MGON
@@ -27,7 +25,7 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
 SHOWN = ["equipment", "model", "scheme", "n_positions", "hold_s", "minutes"]
-ANGLES, UNKNOWN = ("roll", "pitch"), np.full(2, np.nan)
+ANGLES = ("roll", "pitch")
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -89,24 +87,16 @@ class Plan(Result):
         return {"state": self.state, "verdict": self.verdict, "calibrations": calibrations}
 
     @cached_property
-    def compared(self) -> pd.DataFrame:
-        """All calibrations that were compared, with their units in the names of the columns.
-
-        Angles are in mgon, whatever unit the user chose; rank is that in the table of the plan.
-        """
+    def table(self) -> pd.DataFrame:
+        """The cheapest calibrations that reach the accuracy, by rank; angles are in mgon."""
         import pandas as pd  # slow to import, and not needed for what is printed
 
-        rows = [_row(self, candidate) for candidate in self.candidates]
-        return pd.DataFrame(rows).astype({"rank": "Int64"})
-
-    @property
-    def table(self) -> pd.DataFrame:
-        """The cheapest calibrations that reach the accuracy, by rank."""
-        return self.compared.dropna(subset="rank").set_index("rank").sort_index()
+        rows = [_row(self.question, candidate) for candidate in self.ranked]
+        return pd.DataFrame(rows, index=pd.RangeIndex(1, len(rows) + 1, name="rank"))
 
     def to_frame(self) -> pd.DataFrame:
         """Return what the cheapest calibrations take, by rank; `table` has all that is known."""
-        return self.table[SHOWN]
+        return self.table.reindex(columns=SHOWN)
 
     def draw(self, ax: Axes) -> None:
         """Draw the tilt error left over the time in the field."""
@@ -127,7 +117,7 @@ class Plan(Result):
         if not self.ranked:
             raise InputError(self.verdict)
         provenance = {"config_hash": None, "seed": self.seed}
-        write_table(folder / "plan.parquet", self.compared, provenance)
+        write_table(folder / "plan.parquet", self.table.reset_index(), provenance)
         first = self.first
         directions = first.scheme.directions
         if first.search is not None:
@@ -158,9 +148,14 @@ class Plan(Result):
             say(f"plan, table and figure: {place}")
 
 
-def _row(plan: Plan, c: Candidate) -> dict[str, Any]:
-    rank = plan.ranked.index(c) + 1 if c in plan.ranked else None
-    row = {
+def _row(question: Question, c: Candidate) -> dict[str, Any]:
+    assert c.simulated is not None
+    left = {
+        "rms": c.tilt.rms,
+        "rms_simulated": c.simulated.rms,
+        "rms_q95_simulated": c.simulated.quantile(0.95),
+    }
+    return {
         "equipment": c.equipment.name,
         "model": c.model.name,
         "n_parameters": c.model.n_parameters,
@@ -170,17 +165,10 @@ def _row(plan: Plan, c: Candidate) -> dict[str, Any]:
         "sensor_sigma_mps2": c.sigma,
         "minutes": c.seconds / 60,
         "redundancy": c.redundancy,
-        "reaches": plan.question.reached_by(c.tilt),
-        "rank": rank,
-        "limited_by": limits(plan.question, c) if rank else None,
+        "limited_by": limits(question, c),
+        **{f"{a}_{k}_mgon": v[i] / MGON for k, v in left.items() for i, a in enumerate(ANGLES)},
+        "both_rms_q95_simulated_mgon": c.simulated.quantile_of_both(0.95) / MGON,
     }
-    left = {"rms": c.tilt.rms, "rms_simulated": UNKNOWN, "rms_q95_simulated": UNKNOWN}
-    both = np.nan
-    if c.simulated is not None:
-        left |= {"rms_simulated": c.simulated.rms, "rms_q95_simulated": c.simulated.quantile(0.95)}
-        both = c.simulated.quantile_of_both(0.95)
-    angles = {f"{a}_{k}_mgon": v[i] / MGON for k, v in left.items() for i, a in enumerate(ANGLES)}
-    return {**row, **angles, "both_rms_q95_simulated_mgon": both / MGON}
 
 
 def most_accurate(question: Question, chosen: Sequence[Candidate]) -> Candidate | None:

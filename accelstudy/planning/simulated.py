@@ -16,7 +16,6 @@ from accelstudy.simulation.hold_plan import HoldPlan
 from accelstudy.simulation.sessions import Noise
 from accelstudy.study.cell import Cell
 from accelstudy.study.compiling import with_compiled
-from accelstudy.study.estimate import Estimates
 from accelstudy.study.statistics import ANGLES, TILT, TILTS, CellStatistics, simulated_statistics
 
 Array = NDArray[np.float64]
@@ -46,27 +45,16 @@ class SimulatedTilt:
         """Rms over attitudes and calibrations, (2,), rad."""
         return self.statistics["tilt_rms"].value
 
-    @property
-    def error(self) -> Array:
-        """Standard error of `rms`, (2,), rad."""
-        return self.statistics["tilt_rms"].error
-
     def quantile(self, probability: float) -> Array:
         """Error of each angle by itself that this share of the calibrations stayed below, (2,)."""
-        return np.array([float(self._bound(name, probability).value) for name in ANGLES])
+        return np.array([self._quantile(name, probability) for name in ANGLES])
 
     def quantile_of_both(self, probability: float) -> float:
         """Error that roll and pitch both stayed below in this share of the calibrations, rad."""
-        return float(self._bound(BOTH, probability).value)
+        return self._quantile(BOTH, probability)
 
-    def uncertainty(self, confidence: float | None) -> float:
-        """Standard error of `Question.accuracy`, rad, by the number of calibrations."""
-        if confidence is None:
-            return float(self.error[self.rms.argmax()])
-        return float(self._bound(BOTH, confidence).error)
-
-    def _bound(self, name: str, probability: float) -> Estimates:
-        return self.statistics.quantile(TILT, name, probability)
+    def _quantile(self, name: str, probability: float) -> float:
+        return float(self.statistics.quantile(TILT, name, probability).value)
 
 
 def simulate_candidate(

@@ -10,28 +10,13 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from accelstudy.basics.units import (  # noqa: F401
-    GON,
-    MGON,
-    angle_note,
-    display_unit,
-    to_display,
-)
+from accelstudy.basics.units import GON, MGON, angle_note, display_unit, to_display  # noqa: F401
 from accelstudy.basics.wording import amount, interval, number, quantity_text, words
 from accelstudy.design.criteria import MINIMAX
 from accelstudy.pages import render_lines
+from accelstudy.planning import reasons
 from accelstudy.planning.candidates import Candidate, shortest  # noqa: F401
 from accelstudy.planning.question import Question
-from accelstudy.planning.reasons import (  # noqa: F401
-    HOURS,
-    KELVIN,
-    PLAIN,
-    READING,
-    effect_unit,
-    errors_in_use,
-    limits,
-    spoilers,
-)
 from accelstudy.sensors.models import NINE
 from accelstudy.sensors.sensor import SensorModel
 
@@ -53,10 +38,10 @@ def part_lines(part: str, plan: Plan) -> list[str]:
 def assumed_sizes(question: Question) -> list[str]:
     """Effects that are taken to have a usual size, as nothing is known of it, in words."""
     sizes = {
-        effect: quantity_text(question.sizes[effect], effect_unit(effect))
+        effect: quantity_text(question.sizes[effect], reasons.effect_unit(effect))
         for effect in question.assumed
     }
-    return [f"{PLAIN[effect]} ({size})" for effect, size in sizes.items()]
+    return [f"{reasons.PLAIN[effect]} ({size})" for effect, size in sizes.items()]
 
 
 def table_lines(plan: Plan) -> list[str]:
@@ -98,7 +83,7 @@ def _row(plan: Plan, rank: int, candidate: Candidate) -> list[str]:
         f"{candidate.seconds / 60:.1f}",
         *cells,
         amount(left.quantile_of_both(QUOTED), "rad"),
-        limits(plan.question, candidate),
+        reasons.limits(plan.question, candidate),
     ]
 
 

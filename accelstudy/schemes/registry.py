@@ -156,23 +156,9 @@ def _pattern(template: str) -> str:
 
 def _unknown(name: str) -> str:
     names, families = scheme_names(), scheme_families()
-    meant = [*_members(re.findall("[0-9]+", name)), *names]  # with the numbers that the user wrote
-    close = difflib.get_close_matches(name.lower(), meant, n=1)
+    close = difflib.get_close_matches(name.lower(), names, n=1)
     hint = f" Did you mean {close[0]!r}?" if close else ""
     return (
         f"unknown scheme {name!r}.{hint} Schemes: {', '.join(names)}; "
         f"families: {', '.join(families)} (N from 1 to 9999){HOW}"
     )
-
-
-def _members(numbers: list[str]) -> list[str]:
-    """Members of the families that have these numbers in their names."""
-    members = []
-    for family in scheme_families():
-        words = family.split("-")
-        if len(numbers) == sum(word in _NUMBERS for word in words):
-            given = iter(numbers)
-            member = "-".join(next(given) if word in _NUMBERS else word for word in words)
-            if re.fullmatch(_pattern(family), member):
-                members.append(member)
-    return members

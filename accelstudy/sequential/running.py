@@ -21,7 +21,7 @@ from accelstudy.files.reading import read_text
 
 
 def read_running(folder: str | Path) -> Campaign:
-    """Read a session so far; a last line without an end counts if it has all cells.
+    """Read a session so far; a last line without an end is not there yet.
 
     Raises
     ------
@@ -44,12 +44,7 @@ def read_running(folder: str | Path) -> Campaign:
     campaign = _session(whole, header, path)
     if whole == text:
         return campaign
-    try:
-        campaign = _session(text, header, path)
-        odd = "does not end; check that it is whole"
-    except InputError:
-        odd = "is not whole; it is not counted"
-    warning = f"{folder}: the last line of the table {odd}"
+    warning = f"{folder}: the last line of the table has no end yet; it is not counted"
     return replace(campaign, warnings=(*campaign.warnings, warning))
 
 

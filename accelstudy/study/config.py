@@ -356,10 +356,11 @@ class LevelingConfig(ConfigSection):
 class SensitivityConfig(ConfigSection):
     """Variance-based sensitivity analysis of leveling (figures 4 to 6)."""
 
+    retired = {  # noqa: RUF012
+        "resamples": "intervals follow from the scatter of the samples: leave it out"
+    }
+
     base_samples: kinds.BaseSamples = Field(1024, description="Sobol base samples, a power of two")
-    resamples: kinds.Resamples = Field(
-        100, description="bootstrap resamples for confidence intervals"
-    )
     roll_gon: OneOrMore[kinds.Angle] = Field(description="rolls of the grid")
     pitch_gon: OneOrMore[kinds.Pitch] = Field(description="pitches of the grid")
     model: Annotated[SensorModel, _one(_model)] = Field(

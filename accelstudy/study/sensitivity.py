@@ -36,7 +36,6 @@ def sensitivity_table(study: Study, summary: pd.DataFrame) -> pd.DataFrame:
             settings.pitch_gon,
             study.sigma_force,
             settings.base_samples,
-            settings.resamples,
             study.seed,
             g=study.gravity_mps2,
             **of_parameters,

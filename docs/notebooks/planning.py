@@ -28,8 +28,8 @@ print(plan.verdict)
 plan.table[["equipment", "n_positions", "minutes", "roll_rms_simulated_mgon", "limited_by"]]
 
 # %% [markdown]
-# All that was compared is in the figure, and in the table `plan.compared`. A point is a model, a
-# scheme, a number of positions and a duration; the lines are the best of each kind.
+# All that was compared is in the figure. A point is a model, a scheme, a number of positions and a
+# duration; the lines are the best of each kind.
 
 # %%
 ax = plan.plot()

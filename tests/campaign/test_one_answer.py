@@ -3,6 +3,7 @@
 import re
 
 import numpy as np
+import pandas as pd
 import pytest
 import yaml
 from calling import refusal, succeed
@@ -14,6 +15,7 @@ from accelstudy.basics.units import GON, MGON
 from accelstudy.campaign.format import write_campaign
 from accelstudy.campaign.session import Campaign
 from accelstudy.data_sheets import sheet_of_sigma
+from accelstudy.leveling.error import cap_forces
 from accelstudy.planning.candidates import in_scheme
 from accelstudy.planning.question import BY_HAND, Question
 from accelstudy.schemes import get_scheme
@@ -60,6 +62,27 @@ def test_nine_positions_of_rank_eight(tmp_path, directions):
     models = [get_model("bias-scale-nonorthogonality")]
     planned = [*in_scheme(question, get_scheme(str(scheme)), models)]
     assert all(each.tilt.rms.max() > 1 * GON for each in planned)
+
+
+def test_the_tilt_error_of_a_calibration_is_one_number(tmp_path):
+    """`advise` tells that of `calibrate`; two differ by √2 of it, and a reading adds its noise."""
+    campaign = written(tmp_path / "made-up", CUBE, 1)
+    calibration = acs.calibrate(campaign)
+    left = calibration.content["quality"]["tilt_rms_mgon"]
+    own = np.array([left["roll"], left["pitch"]])
+    advice = acs.advise(campaign, tilt_accuracy="10mgon", tilt_range="50gon")
+    np.testing.assert_allclose(advice.rms / MGON, own, rtol=1e-9)
+    chance = acs.compare(calibration, calibration).content["tilt"]
+    of_two = np.array([chance["roll_by_chance_mgon"], chance["pitch_by_chance_mgon"]])
+    np.testing.assert_allclose(of_two, np.sqrt(2) * own, rtol=1e-9)
+    log = pd.DataFrame(cap_forces(50 * GON, 200), columns=["fx", "fy", "fz"])
+    sigmas = ["sigma_roll_mgon", "sigma_pitch_mgon"]
+    quiet, noisy = (
+        np.sqrt(np.mean(acs.apply(calibration, log, sigma=s)[sigmas].to_numpy() ** 2, axis=0))
+        for s in (0.0, 0.002)
+    )
+    np.testing.assert_allclose(quiet, own, rtol=0.02)  # readings are not the true forces
+    np.testing.assert_allclose(noisy[1], np.hypot(own[1], 0.002 / 9.80665 / MGON), rtol=0.02)
 
 
 def test_the_approach_follows_the_campaign_and_is_said(tmp_path):

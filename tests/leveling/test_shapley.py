@@ -124,7 +124,7 @@ def test_the_slope_is_the_derivative():
 def test_total_effects_are_those_of_the_paper():
     """The linear ones beside the Shapley effects, against Sobol's method."""
     found = estimability(get_scheme("mclaren-24"), NINE, GRAVITY, Noise())
-    sampled = leveling_sensitivity([0, 50], [25], SIGMA_FORCE, 256, 20, 1, NINE, PAPER, found.sigma)
+    sampled = leveling_sensitivity([0, 50], [25], SIGMA_FORCE, 256, 1, NINE, PAPER, found.sigma)
     table = shares_of("mclaren-24", [0, 50], [25])
     keys = ["output", "roll_gon", "pitch_gon", "input"]
     both = table.merge(sampled, on=keys, suffixes=("", "_sampled"), validate="one_to_one")

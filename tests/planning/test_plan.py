@@ -8,7 +8,6 @@ import shlex
 from dataclasses import replace
 
 import numpy as np
-import pandas as pd
 import pytest
 import yaml
 from calling import call, refusal, succeed
@@ -26,9 +25,8 @@ from accelstudy.files.tables import read_origin, read_table
 from accelstudy.leveling.error import cap_forces
 from accelstudy.pages import render_lines
 from accelstudy.planning import candidates as known
-from accelstudy.planning.answer import answer
+from accelstudy.planning.answer import CalibrationKind, answer
 from accelstudy.planning.candidates import candidates, information_of, tilt_of
-from accelstudy.planning.fewest import CalibrationKind
 from accelstudy.planning.question import BY_HAND, ROBOT, Question
 from accelstudy.planning.reasons import errors_in_use, limits, spoilers
 from accelstudy.planning.simulated import cell_of
@@ -157,7 +155,10 @@ def test_simulation_agrees_with_linear_theory(plan):
     for ranked in plan.ranked:
         expected, simulated = ranked.tilt.rms, ranked.simulated
         assert simulated.statistics.simulated == plan.replicates
-        assert np.all(np.abs(simulated.rms - expected) < 4 * simulated.error + 0.01 * expected)
+        assert np.all(
+            np.abs(simulated.rms - expected)
+            < 4 * simulated.statistics["tilt_rms"].error + 0.01 * expected
+        )
 
 
 def test_what_is_simulated_is_what_these_calibrations_leave(plan):
@@ -337,7 +338,9 @@ def test_the_recommended_positions_suffice_and_both_angles_stay_below_what_is_sa
     value, error = rms(left)
     assert value < 10 * MGON + 3 * error
     said = plan.first.simulated
-    assert value == pytest.approx(said.rms.max(), abs=4 * np.hypot(error, said.error.max()))
+    assert value == pytest.approx(
+        said.rms.max(), abs=4 * np.hypot(error, said.statistics["tilt_rms"].error.max())
+    )
     inside = np.mean(np.all(left < said.quantile_of_both(0.95), axis=1))
     shares = 0.05 * 0.95 * (1 / len(left) + 1 / plan.replicates)
     assert abs(inside - 0.95) < 4 * np.sqrt(shares)
@@ -354,7 +357,6 @@ def test_one_position_less_does_not_suffice(plan):
     optimum = continuous_optimum(search.task, search.criterion, Attitudes(), n - 1)
     assert np.exp(optimum.bound / 2) > 10 * MGON
     assert kind.lower_bound(kind.best(n)) in (n - 1, n)  # of the positions' own derivatives
-    assert f"{n - 1} positions leave" in part_lines("answer", plan)[2]
 
 
 def test_the_fewest_positions_suffice_although_the_model_lacks_effects():
@@ -387,7 +389,7 @@ def test_a_share_of_the_calibrations_is_of_both_angles_at_once():
 def test_with_a_robot_five_positions_do_what_four_do_not(plan):
     robot = next(r for r in plan.ranked if r.equipment == ROBOT)
     assert robot.scheme.n_positions == 5
-    assert robot.fewer.rms.max() > 10 * MGON
+    assert CalibrationKind.of(plan.question, robot).best(4).tilt.rms.max() > 10 * MGON
 
 
 @pytest.mark.parametrize("name", ["adxl355", "mpu-6050", "stim300"])
@@ -421,7 +423,7 @@ def test_the_command_writes_what_it_says(tmp_path):
     table = read_table(out / "plan.parquet")
     top = table[table["rank"] == 1].iloc[0]
     assert top["roll_rms_simulated_mgon"] <= 20
-    assert pd.isna(table["rank"]).sum() > 50
+    assert (table["roll_rms_mgon"] <= 20.5).all()
     assert read_origin(out / "plan.parquet")["seed"] == 1
     assert get_scheme(str(out / "positions.yaml")).n_positions == top["n_positions"]
     again = succeed(*asked, out, "--quiet")

@@ -31,7 +31,7 @@ from accelstudy.lots.passes import Pass
 from accelstudy.sensors.models import get_model
 from accelstudy.study.sensitivity import sensitivity_table, shapley_table
 
-SENSITIVITY = {"base_samples": 2, "resamples": 2, "roll_gon": 10, "pitch_gon": 0}
+SENSITIVITY = {"base_samples": 2, "roll_gon": 10, "pitch_gon": 0}
 OPTIONAL = {"sigma_position_axes_mps2"}
 """Keys that a file need not have."""
 

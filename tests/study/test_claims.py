@@ -31,12 +31,12 @@ from accelstudy.study.sensitivity import shapley_table
 from accelstudy.study.tables import with_derived
 
 REPLICATES = 1000
-BASE_SAMPLES, RESAMPLES = 256, 20
+BASE_SAMPLES = 256
 KEYS = {
     "grids": [grid(schemes=["mclaren-24", "rings-24"], replicates=REPLICATES)],
     "leveling": {"attitudes": 5},
     "sensitivity": {
-        "base_samples": BASE_SAMPLES, "resamples": RESAMPLES,
+        "base_samples": BASE_SAMPLES,
         "roll_gon": [0, 20, 50], "pitch_gon": [0, 50],
     },
     "paper": True,
@@ -54,7 +54,7 @@ def tables(folder):
     model = get_model(NINE)
     sigma = np.repeat([0.70711e-3, 101.97e-6, 10.264 * MGON], 3)
     sensitivity = leveling_sensitivity(
-        [0, 20, 50], [0, 50], 0.002, BASE_SAMPLES, RESAMPLES, 1,
+        [0, 20, 50], [0, 50], 0.002, BASE_SAMPLES, 1,
         model=model, parameters=model.vector(PAPER_TRUTH), sigma_parameters=sigma,
     )  # fmt: skip
     sensitivity.insert(0, "analysis", "gravity")

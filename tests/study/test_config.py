@@ -98,7 +98,7 @@ def test_config_yaml_has_every_top_level_key():
 
 # --- bad input: what any file may have, tests/basics have -----------------------------------------
 
-SENSITIVITY = {"roll_gon": [0, 50], "pitch_gon": [0, 50], "base_samples": 16, "resamples": 5}
+SENSITIVITY = {"roll_gon": [0, 50], "pitch_gon": [0, 50], "base_samples": 16}
 
 
 def test_overlaid_files_are_all_named(tmp_path):

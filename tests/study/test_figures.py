@@ -26,7 +26,7 @@ PAPER = content(
     presets={"replicates": 5},
     leveling={"attitudes": 10},
     sensitivity={
-        **{"base_samples": 32, "resamples": 10},
+        **{"base_samples": 32},
         **{"roll_gon": [-50, 0, 50], "pitch_gon": [-25, 0, 25]},
     },
     paper=True,

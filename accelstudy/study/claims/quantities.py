@@ -117,7 +117,7 @@ def effect_of_force(data: ClaimData, force: str, at_roll: float) -> Numbers:
     at = (table["roll_gon"] == at_roll) & (table["pitch_gon"] == 0)
     table = table[at & (table["analysis"] == "forces")]
     if table.empty:  # not on the grid of the study
-        samples = settings.base_samples, settings.resamples, study.seed
+        samples = settings.base_samples, study.seed
         noise, g = study.sigma_force, study.gravity_mps2
         table = leveling_sensitivity([at_roll], [0], noise, *samples, g=g)
     return _largest(table[(table["output"] == "roll") & (table["input"] == force)])
