@@ -120,7 +120,8 @@ class Batch(Result):
                 self.failed[name] = one_line(error).removeprefix(f"{name}: ")
         if not self.calibrations:
             name, reason = next(iter(self.failed.items()))
-            raise InputError(f"no campaign can be calibrated: {name}: {reason}")
+            others = f" (and {len(self.failed) - 1} more)" if len(self.failed) > 1 else ""
+            raise InputError(f"no campaign can be calibrated: {name}: {reason}{others}")
 
     @cached_property
     def content(self) -> Mapping[str, Any]:

@@ -105,14 +105,18 @@ def test_a_batch_in_python(made, tmp_path):
         acs.batch([folder / "campaigns/plain", tmp_path / "plain"])
 
 
-def test_where_all_failed_the_page_says_why(tmp_path):
-    """What a page shows is escaped."""
-    batch = acs.batch(str(tmp_path / "<i>&"))
+def test_where_all_failed_there_is_one_line(tmp_path):
+    folders = [str(tmp_path / name) for name in ("first", "second")]
+    line = r"no campaign can be calibrated: first: .*no such folder.* \(and 1 more\)$"
+    with pytest.raises(acs.InputError, match=line):
+        acs.batch(folders)
+
+
+def test_what_a_page_shows_is_escaped(made, tmp_path):
+    folder, _ = made
+    batch = acs.batch([folder / "campaigns/plain", str(tmp_path / "<i>&")])
     batch.save(tmp_path / "out")
     page = (tmp_path / "out/report.html").read_text(encoding="utf-8")
     assert (batch.state, [*batch.failed]) == ("not calibrated", ["i-"])
-    assert len(pd.read_parquet(tmp_path / "out/campaigns.parquet")) == 1
-    assert pd.read_parquet(tmp_path / "out/parameters.parquet").empty
-    assert "Calibrated</h2>" not in page
     assert "<i>" not in page
     assert "&lt;i&gt;&amp;: no such folder" in page
