@@ -141,7 +141,10 @@ def test_keywords_of_an_import_are_the_keys_of_its_settings() -> None:
     }  # fmt: skip
     for text, si in (("8g", 8 * STANDARD_GRAVITY), (30, 30.0)):
         assert ImportSettings.model_validate({"range": text}).full_range == si
-    for before, now in (({"rate_hz": 50}, {"rate": "50Hz"}), ({"window_s": 2}, {"window": "2s"})):
+    for before, now in (
+        ({"rate_hz": 50}, {"rate": "50Hz"}), ({"window_s": 2}, {"window": "2s"}),
+        ({"gravity": {"value_mps2": 9.81}}, {"gravity": "9.81 m/s^2"}),
+    ):  # fmt: skip
         assert ImportSettings(**before) == ImportSettings(**now)
 
 

@@ -7,7 +7,7 @@ from collections.abc import Mapping
 from typing import Annotated, Any, ClassVar, Literal, Self
 
 import numpy as np
-from pydantic import Field, model_validator
+from pydantic import BeforeValidator, Field, model_validator
 
 from accelstudy.basics.arguments import tidy
 from accelstudy.basics.errors import InputError, key
@@ -40,6 +40,11 @@ class GravitySettings(ConfigSection):
     sigma_mps2: SigmaGravity = Field(0.0, description="its standard deviation; 0 holds it fixed")
 
 
+def _gravity_of(value: Any) -> Any:
+    """Take local gravity alone for the block, as the option does."""
+    return {"value_mps2": value} if isinstance(value, float | int | str) else value
+
+
 class RobotSettings(ConfigSection):
     """The robot whose angles a table of means has."""
 
@@ -62,7 +67,7 @@ class ImportSettings(LogLayout):
     )
     name: str | None = Field(None, description="name of the campaign; that of the file if absent")
     sensor: str | None = Field(None, description="what was calibrated")
-    gravity: GravitySettings = GravitySettings()
+    gravity: Annotated[GravitySettings, BeforeValidator(_gravity_of)] = GravitySettings()
     robot: RobotSettings | None = Field(None, description="with means: the robot's angles")
     range_mps2: Annotated[Annotated[Positive, _LARGE] | None, in_unit("m/s^2")] = Field(
         None, alias="range", description="the sensor measures ± this"
