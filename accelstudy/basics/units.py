@@ -232,7 +232,8 @@ def parse_quantity(
     known = UNITS.get(unit, {unit: 1.0})
     if match is None or not (match[2] or bare or float(match[1]) == 0):
         number = "a number" if bare else "a number with its unit"
-        like = _ends(least, most) if unit == "1" else f", as 2{next(iter(known))}"
+        ends = _ends(least, most)
+        like = f", as 2{next(iter(known))}" if unit != "1" else ends and f" of{ends}"
         raise InputError(f"expected {number}{like}, not {brief(text)}")
     given = match[2] or (unit if bare else next(iter(known)))
     for spelling, plain in _SPELLINGS.items():

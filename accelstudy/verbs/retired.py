@@ -38,7 +38,7 @@ KEYWORDS = {
     },
     "simulate": {"robot_accuracy": "`robot_sigma` takes it"},
     "simulate_campaign": {
-        "gross": "change the rows of positions.csv",
+        **dict.fromkeys(("gross", "gross_error"), "change the rows of positions.csv"),
         "hold": "campaigns have no slopes within holds",
         "no_time": "`interval` is none then",
         "robot_sigma_mgon": "`robot_sigma` takes it with its unit, as 5mgon",
