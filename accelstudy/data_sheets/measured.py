@@ -18,8 +18,7 @@ from accelstudy.campaign.importing.settings import ImportSettings
 from accelstudy.data_sheets.sheet import FLICKER, DataSheet
 from accelstudy.effects import get_effect
 from accelstudy.epochs.course import YEAR
-from accelstudy.files.documents import Document, Part
-from accelstudy.files.validation import Finite, NotNegative
+from accelstudy.epochs.file_format import HistoryDocument
 
 MIN_VARIANCE_SHARE = 0.02
 """A kind of noise must make up this part of the Allan variance at some averaging time."""
@@ -103,7 +102,7 @@ def with_history(sheet: DataSheet, path: str | Path) -> DataSheet:
     InputError
         If it is no history, none of a bias, or one of two calibrations.
     """
-    document = _History.read(path)
+    document = HistoryDocument.read(path)
     names = [parameter.name for parameter in get_effect("bias").parameters]
     biases = [parameter for parameter in document.parameters if parameter.name in names]
     if not biases:
@@ -120,25 +119,3 @@ def with_history(sheet: DataSheet, path: str | Path) -> DataSheet:
         sources={**sheet.sources, "repeatability": str(path)},
         assumed=sheet.assumed - {"repeatability"},
     )
-
-
-class _Rate(Part):
-    per_year: Finite
-    sigma: NotNegative
-
-
-class _Scatter(Part):
-    sd: NotNegative
-
-
-class _Parameter(Part):
-    name: str
-    rate: _Rate | None
-    scatter: _Scatter | None
-
-
-class _History(Document):
-    """The part of `history.json` that is read."""
-
-    file = "history.json"
-    parameters: list[_Parameter]

@@ -13,13 +13,14 @@ import schemas
 from mkdocs.structure.files import File
 
 from accelstudy.campaign.calibration.file_format import CalibrationDocument
+from accelstudy.epochs.file_format import HistoryDocument
 from accelstudy.lots.file_format import LotDocument
 
 MODULES = {
     module.__name__: module
     for module in (catalogue, file_formats, gallery, help_texts, quotes, schemas)
 }
-DOCUMENTS = (CalibrationDocument, LotDocument)
+DOCUMENTS = (CalibrationDocument, HistoryDocument, LotDocument)
 """Files whose JSON Schema can be downloaded."""
 CALL = re.compile(r"^<!-- (\w+)\.(\w+)\((.*)\) -->$", re.MULTILINE)
 

@@ -136,9 +136,7 @@ def test_the_formulas_of_every_effect(approach):
 
         formulas = Formulas(list(traced.expressions), frozenset())
         code = Code("f", (), ("x", "y"))
-        table = {
-            symbol: code.load("x", k * LANES) for k, symbol in enumerate(traced.arguments)
-        }
+        table = {symbol: code.load("x", k * LANES) for k, symbol in enumerate(traced.arguments)}
         for k, value in enumerate(formulas.write(code, table)):
             code.store(value, "y", k * LANES)
         result = np.empty((len(traced.expressions), LANES))
