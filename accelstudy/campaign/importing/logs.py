@@ -15,10 +15,9 @@ from accelstudy.basics.errors import InputError
 from accelstudy.basics.units import MGON, UNITS, display_unit, to_display
 from accelstudy.campaign.gross_errors.recognition import check_plausible
 from accelstudy.campaign.header import LogLayout, Place
-from accelstudy.campaign.importing.columns import SDS
+from accelstudy.campaign.importing.columns import SDS, thermometers
 from accelstudy.campaign.importing.holds import Holds, find_blocks, find_holds
 from accelstudy.campaign.importing.log import AnyLog, Log, open_log
-from accelstudy.campaign.importing.names import thermometers
 from accelstudy.campaign.importing.noise import sigma_text, steps_text
 from accelstudy.campaign.importing.recording import Recording
 from accelstudy.campaign.importing.settings import ImportSettings

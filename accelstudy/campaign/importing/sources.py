@@ -16,7 +16,7 @@ import pyarrow.compute as pc
 from numpy.typing import NDArray
 
 from accelstudy.basics.errors import InputError, UnknownNameError, printable
-from accelstudy.campaign.importing.names import layout_by_names
+from accelstudy.campaign.importing.columns import layout_by_names
 
 _NUMBER = r"^[+-]?([0-9]+[.]?[0-9]*|[.][0-9]+)([eE]([+]?[0-9]{1,2}|-[0-2]?[0-9]{1,2}))?$"
 _LONG = 1e15  # from which on a whole number may have more digits than a float

@@ -21,7 +21,7 @@ from pyarrow import csv as arrow_csv
 from accelstudy.basics.errors import InputError, printable
 from accelstudy.basics.progress import stage
 from accelstudy.basics.wording import one_line, plural
-from accelstudy.campaign.importing.names import unit_of_cell
+from accelstudy.campaign.importing.columns import unit_of_cell
 from accelstudy.campaign.importing.sources import Source
 from accelstudy.files.reading import readable
 
