@@ -64,6 +64,7 @@ def pooled_deviation(
     lengths = np.array([len(record) for record in arrays])
     factors = np.array(averaging_factors(lengths.max() // 2), dtype=int)
     squares = np.zeros((len(factors), arrays[0].shape[1]))
+    one, two = np.empty((2, lengths.max() + 1))
     for i, record in enumerate(arrays):
         centred = record - record.mean(axis=0)
         centred[:, (record == record[:1]).all(axis=0)] = 0.0  # not what rounding the mean leaves
@@ -71,9 +72,9 @@ def pooled_deviation(
         for channel, values in enumerate(turned.T):
             sums = np.concatenate([[0.0], np.cumsum(values)])
             for at, m in enumerate(factors[2 * factors <= len(values)]):
-                first = sums[m:] - sums[:-m]
-                second = first[m:] - first[:-m]
-                squares[at, channel] += second @ second / (2.0 * m**2)
+                first = np.subtract(sums[m:], sums[:-m], out=one[: len(sums) - m])
+                second = np.subtract(first[m:], first[:-m], out=two[: len(first) - m])
+                squares[at, channel] += np.einsum("i,i", second, second) / (2.0 * m**2)
     fits = lengths[:, None] >= 2 * factors
     terms = np.sum(fits * (lengths[:, None] + 1 - 2 * factors), axis=0)
     independent = np.sum(fits * (lengths[:, None] // factors - 1), axis=0)
