@@ -35,9 +35,10 @@ from accelstudy.files.validation import (
     SigmaAngle,
     SigmaForce,
     SigmaGravity,
+    bounds_of,
     in_unit,
 )
-from accelstudy.sensors.conversion import Conversion, conversion_of
+from accelstudy.sensors.conversion import MAX_VALUE, Conversion, conversion_of
 from accelstudy.sensors.frames import Frame, parse_frame
 
 HEADER = "campaign.yaml"
@@ -178,15 +179,18 @@ def _not_zero(value: float) -> float:
 
 
 PerAxis = Field(min_length=3, max_length=3)
+Calculable = Annotated[float, *bounds_of(Range(-MAX_VALUE, MAX_VALUE))]
 
 
 class Nominal(ConfigSection):
     """Nominal conversion of counts: f = (raw − offset) · scale, m/s², per axis."""
 
-    scale: Annotated[list[Annotated[Finite, AfterValidator(_not_zero)]], PerAxis] = Field(
+    scale: Annotated[list[Annotated[Calculable, AfterValidator(_not_zero)]], PerAxis] = Field(
         description="m/s² per count, of x, y and z"
     )
-    offset: Annotated[list[Finite], PerAxis] = Field(description="reading at 0 m/s², of x, y and z")
+    offset: Annotated[list[Calculable], PerAxis] = Field(
+        description="reading at 0 m/s², of x, y and z"
+    )
 
 
 class _Gravity(ConfigSection):
@@ -269,10 +273,8 @@ class Header(ConfigSection):
         unit = COLUMNS[attribute].unit
         if unit != "unit":
             return Conversion(np.array([GON if unit == "gon" else 1.0]), np.zeros(1))
-        if self.nominal is None:
-            forces = conversion_of(self.unit)
-        else:
-            forces = Conversion(np.array(self.nominal.scale), np.array(self.nominal.offset))
+        nominal = {} if self.nominal is None else self.nominal.model_dump()
+        forces = conversion_of(self.unit, **nominal)
         if attribute == "forces":
             return forces
         # Sds have neither an offset nor a sign.

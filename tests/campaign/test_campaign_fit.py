@@ -37,13 +37,6 @@ def test_initial_values_are_the_sphere():
     )
 
 
-def test_a_robot_is_needed_for_the_robot_approach():
-    campaign = simulated_campaign({})
-    without = Campaign("plain", campaign.positions, campaign.forces, campaign.gravity)
-    with pytest.raises(InputError, match="roll_robot_gon"):
-        fit_campaign(without, NINE, ROBOT)
-
-
 def test_a_nonlinear_model_has_no_matrix():
     model = get_model("bias-scale-nonorthogonality-quadratic")
     assert model.affine(model.vector({"k2_x": 1e-3})) is None

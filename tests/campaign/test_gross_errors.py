@@ -188,8 +188,7 @@ def test_several_gross_errors_are_undone_together(designs):
     found = recognise(wrong)
     assert {name for name, _ in found.names} == {*GROSS_ERRORS}
     assert ("outlier_position", 21) in found.names
-    assert found.reasons["unit_error"] == "the forces are in g"
-    assert found.reason.count(";") == len(found.reasons) - 1
+    assert "the forces are in g" in found.reason.split("; ")
     np.testing.assert_allclose(
         found.corrected.forces, np.delete(right.forces, 20, axis=0), atol=0.06
     )

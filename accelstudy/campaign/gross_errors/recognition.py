@@ -103,17 +103,9 @@ class Recognition:
         return self.errors[0].name
 
     @property
-    def reasons(self) -> dict[str, str]:
-        """What is wrong, in words, by the names of the errors."""
-        return {
-            name: "; ".join(error.reason for error in self.errors if error.name == name)
-            for name, _ in self.names
-        }
-
-    @property
     def reason(self) -> str:
         """All that is wrong, in words."""
-        return "; ".join(self.reasons.values())
+        return "; ".join(error.reason for error in self.errors)
 
     @property
     def corrected(self) -> Campaign:
