@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import inspect
+import os
 import re
 from collections.abc import Mapping
 from pathlib import Path
@@ -53,8 +54,7 @@ class Document(Part):
         InputError
             If there is no such file, or it holds something else.
         """
-        path = Path(path)
-        path = path / cls.file if path.is_dir() else path
+        path = Path(path, cls.file) if os.path.isdir(path) else Path(path)
         return cls.check(read_json(path, cls.refusal()), str(path))
 
     @classmethod
