@@ -9,8 +9,7 @@ the sd τ, as by switching off and on, and the noise of the calibration.
   about the line, whether or not there is scatter (Knapp & Hartung 2003, Statistics in Medicine 22,
   2693; exact where all sigmas are equal).
 * That is so if the scatter of each session is independent of that of the others. If instead it adds
-  up from session to session, a random walk with the variance q t, a line is hardly seen in it. The
-  rate is given for that, too: by generalized least squares, with q by the squares, as τ is.
+  up from session to session, a random walk, the interval of the rate is much too short.
 """
 
 from __future__ import annotations
@@ -21,7 +20,7 @@ from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy import linalg, optimize, stats
+from scipy import stats
 
 from accelstudy.adjustment.random_effects import RandomEffects
 from accelstudy.basics.shares import sigmas_95
@@ -79,31 +78,6 @@ class ParameterCourse:
         """Rate per year, if sessions are independent."""
         variance = self.line.covariance[1, 1]
         return Rate(float(self.line.estimates[1]), float(np.sqrt(variance)), self.line.dof)
-
-    @cached_property
-    def wandering_rate(self) -> Rate:
-        """Rate per year, if the parameter walks at random instead of scattering."""
-        design, f = self.line.design, self.line.dof
-        since = self.years - self.years.min()
-        noise, walk = np.diag(self.variances), np.minimum.outer(since, since)
-        # Contrasts without value and rate, of which the noise is white and the walk diagonal.
-        free = linalg.null_space((design * [1.0, 1 / np.ptp(since)]).T)
-        sizes, turned = linalg.eigh(free.T @ walk @ free, free.T @ noise @ free)
-        squares = (turned.T @ (free.T @ self.values)) ** 2
-
-        def too_many(q: float) -> float:
-            return float(np.sum(squares / (1 + q * np.maximum(sizes, 0.0)))) - f
-
-        q = 0.0
-        if too_many(0.0) > 0:
-            most = 1 / float(sizes.max())
-            while too_many(most) > 0:
-                most *= 4
-            q = optimize.brentq(too_many, 0.0, most)
-        weighted = np.linalg.solve(noise + q * walk, design).T
-        covariance = np.linalg.inv(weighted @ design)
-        rate = float((covariance @ weighted @ self.values)[1])
-        return Rate(rate, float(np.sqrt(covariance[1, 1])), f)
 
     def p_value_of_scatter(self, level: float = LEVEL) -> float:
         """Probability that noise alone leaves such squares about the line; exact at some level."""

@@ -51,14 +51,12 @@ class Rate(Part):
     per_year : rate
     sigma : of the rate
     ci95 : interval if sessions scatter independently
-    ci95_wandering : interval for a random walk
     p_value : of the test of a drift
     """
 
     per_year: Finite
     sigma: NotNegative
     ci95: list[float | None] | None = None
-    ci95_wandering: list[float | None] | None = None
     p_value: float | None = None
 
 

@@ -16,7 +16,6 @@ from numpy.typing import NDArray
 
 from accelstudy.basics.dates import read_date
 from accelstudy.basics.errors import InputError, key
-from accelstudy.basics.shares import sigmas_95
 from accelstudy.basics.units import GON, MGON, shown_unit, to_display
 from accelstudy.basics.wording import comma_list, estimate, plural
 from accelstudy.campaign.calibration.document import json_content, write_json
@@ -41,8 +40,6 @@ MIN_DIFFERENCE = 1e-12
 """rad, largest difference of tilts that rounding may cause."""
 PANELS = 3
 """Panels side by side."""
-LINE_POINTS = 50
-"""Number of points of a line."""
 
 
 class History(Result):
@@ -195,7 +192,6 @@ class History(Result):
                     "per_year": course.rate.per_year,
                     "sigma": course.rate.sigma,
                     "ci95": course.rate.interval,
-                    "ci95_wandering": course.wandering_rate.interval,
                     "p_value": course.rate.p_value,
                 }
                 row["scatter"] = {
@@ -209,13 +205,10 @@ class History(Result):
     @cached_property
     def sentences(self) -> list[str]:
         """What changed, drifts and scatters, and what it matters; the verdict comes first."""
-        texts: dict[str, list[str]] = {"drifts": [], "unsure": [], "scatters": [], "changed": []}
+        texts: dict[str, list[str]] = {"drifts": [], "scatters": [], "changed": []}
         for k, row in enumerate(self.rows):
             if "drifts" in row["found"]:
-                rate, walk = self.courses[k].rate, self.courses[k].wandering_rate
-                texts["drifts"].append(change_text(row, *rate[:2]))
-                if walk.p_value >= LEVEL / len(self.rows):
-                    texts["unsure"].append(change_text(row, *walk[:2]))
+                texts["drifts"].append(change_text(row, *self.courses[k].rate[:2]))
             if "scatters" in row["found"]:
                 scatter = size_text(row["scatter"]["sd"], row["unit"])
                 texts["scatters"].append(f"{row['name']} by {scatter}")
@@ -237,13 +230,13 @@ class History(Result):
         test = self.change.test
         names = ("roll_mgon", "pitch_mgon", "roll_by_chance_mgon", "pitch_by_chance_mgon")
         tilt = zip(names, (self.tilt / MGON).ravel().tolist(), strict=True)
-        dates = [date.isoformat() for date in self.dates] or [None] * len(self.calibrations)
+        dates = [date.isoformat() for date in self.dates]
         content: dict[str, Any] = json_content({
             "schema_version": 1,
             "sensor": self.sensor,
             "calibrations": [
-                {"campaign": one.content["campaign"], "date": date}
-                for one, date in zip(self.calibrations, dates, strict=True)
+                {"campaign": one.content["campaign"], "date": dates[i] if dates else None}
+                for i, one in enumerate(self.calibrations)
             ],
             "effects": [effect.spec for effect in self.model.effects],
             "state": STATES[test.congruent],
@@ -302,7 +295,7 @@ class History(Result):
         ax.legend(ncols=4)
 
     def figure(self) -> Figure:
-        """Draw each parameter in all calibrations, and its line, with 95 % intervals."""
+        """Draw each parameter in all calibrations with 95 % intervals, and its line."""
         rows = -(-len(self.parameters) // PANELS)
         figure = new_figure(FULL, 12 + 36 * rows)
         panels = figure.subplots(rows, PANELS, sharex=True, squeeze=False).ravel()
@@ -311,12 +304,12 @@ class History(Result):
             ax.tick_params(axis="x", labelbottom=k + PANELS >= len(self.parameters))
         for ax in panels[len(self.parameters) :]:
             ax.set_visible(False)
-        lines = " and lines with 95 % intervals; dotted: no drift found"
-        figure.suptitle(f"Calibrations{lines if self.courses else ' with 95 % intervals'}")
+        lines = ", and lines; dotted: no drift found" if self.courses else ""
+        figure.suptitle(f"Calibrations with 95 % intervals{lines}")
         return figure
 
     def _draw_parameter(self, ax: Axes, k: int) -> None:
-        """Draw the calibrations of a parameter, and its line with the band that holds 95 %."""
+        """Draw the calibrations of a parameter, and its line."""
         parameter, found = self.parameters[k], self.found[k]
         unit, times = parameter.unit, self._times
         values, halves = (to_display(v[:, k], unit) for v in (self.estimates, 1.96 * self.sigmas))
@@ -333,18 +326,10 @@ class History(Result):
         ax.xaxis.set(major_locator=locator, major_formatter=formatter)
         if not self.courses:
             return
-        course, colour = self.courses[k], group_colour(group_of(parameter.name))
-        years = np.linspace(course.years[0], 0.0, LINE_POINTS)
-        design = np.column_stack([np.ones(LINE_POINTS), years])
-        between = times[-1] + (years * YEAR * 1e6).astype("timedelta64[us]")
-        line = to_display(design @ course.line.estimates, unit)
-        variance = np.einsum("iu,uw,iw->i", design, course.line.covariance, design)
-        half = to_display(sigmas_95(course.rate.dof) * np.sqrt(variance), unit)
-        seen = ax.get_ylim()
-        ax.fill_between(between, line - half, line + half, color=colour, alpha=0.15, linewidth=0)
-        ax.plot(between, line, "-" if "drifts" in found else ":", color=colour)
-        # The band of a few calibrations would dwarf them.
-        ax.set_ylim(seen[0] - 0.3 * np.ptp(seen), seen[1] + 0.3 * np.ptp(seen))
+        line, ends = self.courses[k].line.estimates, [0, -1]
+        values = to_display(line[0] + line[1] * self.years[ends], unit)
+        style = "-" if "drifts" in found else ":"
+        ax.plot(times[ends], values, style, color=group_colour(group_of(parameter.name)))
 
 
 def _check_alike(calibrations: Sequence[SensorCalibration]) -> None:

@@ -77,32 +77,6 @@ def test_intervals_hold_rate_and_scatter(sigmas, scatter):
         assert held == pytest.approx(0.95, abs=tolerance(0.05))
 
 
-@pytest.mark.parametrize("n_sessions", [5, 10])
-def test_a_random_walk_has_an_interval_of_its_own(n_sessions):
-    """Independent scatter is what the usual interval takes it for: it holds far too seldom."""
-    rng = np.random.default_rng(6)
-    years = np.linspace(-3, 0, n_sessions)
-    ones, rate, level, n = np.ones(n_sessions), 0.4, LEVEL / 9, 150
-    usual, wandering, named = 0, 0, []
-    for _ in range(n):
-        walk = 100 * np.sqrt(np.diff(years)) * rng.standard_normal(n_sessions - 1)
-        values = rate * years + np.append(0, np.cumsum(walk)) + rng.standard_normal(n_sessions)
-        course = ParameterCourse(years, values, ones, np.inf * ones)
-        usual += course.rate.interval[0] < rate < course.rate.interval[1]
-        wandering += course.wandering_rate.interval[0] < rate < course.wandering_rate.interval[1]
-        if "drifts" in course.found(level):
-            named.append(course.wandering_rate.p_value >= level)
-    # Beside a walk that is this large noise is nothing, and the interval exact.
-    assert wandering / n == pytest.approx(0.95, abs=tolerance(0.05, n))
-    assert usual / n <= 0.8
-    # That a drift may be none is said of nearly all that are named, and of no strong one.
-    assert np.mean(named) >= 0.8
-    strong = ParameterCourse(
-        years, 1000 * years + rng.standard_normal(n_sessions), ones, np.inf * ones
-    )
-    assert strong.wandering_rate.p_value < level
-
-
 @pytest.mark.parametrize("true", [None, "drifts", "scatters"])
 def test_all_tests_have_one_level(true):
     """Nine parameters whose noise is correlated, and of which none does anything, or three do."""
