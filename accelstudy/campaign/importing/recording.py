@@ -137,8 +137,7 @@ def _checked_samples(log: Log, alone: bool) -> pd.DataFrame:
     """Samples of a log that lack nothing; those of a part of a recording need not change."""
     lost, place = log.lost, log.places.get("time")
     samples = log.samples[~lost] if lost.any() else log.samples
-    backward = np.diff(samples["time"]) <= 0
-    if place is not None and backward.any():
+    if place is not None and (backward := np.diff(samples["time"]) <= 0).any():
         row = int(samples.index[1 + int(np.argmax(backward))])
         where, cell = log.source.look_up(row, place)
         raise InputError(

@@ -73,7 +73,7 @@ class Windows:
     rounding : float, m/s², noise of a window by rounding alone
     variance : (n,) array, (m/s²)², norm of the variances of the axes in the window about each
         sample; NaN about those too near to a gap or an end for a window, and if it is frozen
-    centred : (n,) bool array, where there is a window
+    centred : slice or (n,) bool array, of the samples about which there is a window
     warnings : list of str
 
     Raises
@@ -88,15 +88,20 @@ class Windows:
         joints = np.cumsum(log.lengths)[:-1] - 1
         gaps = int(jumps.sum() - jumps[joints].sum())
         jumps[joints] = True
-        piece = np.concatenate([[0], np.cumsum(jumps)])
         self.variance, frozen = window_variance(log.forces, width)
-        self.variance[half : len(piece) - half][piece[2 * half :] != piece[: -2 * half]] = np.nan
-        self.centred = np.isfinite(self.variance)
-        if not self.centred.any():
+        if jumps.any():
+            piece = np.concatenate([[0], np.cumsum(jumps)])
+            apart = piece[2 * half :] != piece[: -2 * half]
+            self.variance[half : len(piece) - half][apart] = np.nan
+        centred = np.isfinite(self.variance)
+        if not centred.any():
             raise InputError(
                 f"{log.path}: too few samples for a window of {width}, or gaps all over"
                 f"{log.unit_hint()}"
             )
+        # A part of an array is no copy of it.
+        whole = slice(half, len(centred) - half)
+        self.centred = whole if centred[whole].all() else centred
         self.steps = np.array([step_in(force[self.centred]) for force in log.forces.T])
         self.rounding = float(np.sqrt(np.linalg.norm(self.steps**2 / 12)))
         self.warnings = [f"{plural(gaps, 'gap')} in time; no hold spans one"] if gaps else []
@@ -107,7 +112,7 @@ class Windows:
             or floor > MAX_REST_NOISE * STANDARD_GRAVITY
         ):
             np.maximum(self.variance, self.rounding**2, out=self.variance)
-        elif (share := np.sum(frozen & self.centred) / self.centred.sum()) > 0:
+        elif (share := np.sum(frozen & centred) / centred.sum()) > 0:
             self.variance[frozen] = np.nan
             self.warnings.append(
                 f"a channel does not change over a window in {100 * share:.2g} % of the log; left "
