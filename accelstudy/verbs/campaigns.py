@@ -40,13 +40,19 @@ def read_log(
     offset: kinds.Offset = None,
     frame: kinds.Frame = None,
 ) -> Log:
-    """Say which log to read, and how.
+    """Read a log, with what is said of it.
 
     Parameters
     ----------
     log : path or DataFrame
         Text (CSV or columns, perhaps .gz), MATLAB, Parquet, a bag of ROS 1 or 2 (extra ros) or a
         ULog of PX4 (extra px4); a table in memory, of which an index of dates is the time.
+
+    Returns
+    -------
+    Log
+        Its raw table is `source.table`, and `samples` is a DataFrame in SI. `find_holds` and
+        `apply` take it.
 
     Raises
     ------
