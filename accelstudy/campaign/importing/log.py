@@ -199,11 +199,11 @@ def open_log(log: AnyLog, given: Mapping[str, Any], **how: Any) -> Log:
     if isinstance(log, pd.DataFrame):
         return _log_in_memory(log, given, **how)
     if isinstance(log, Log):
-        variable = given.get("variable", log.given.get("variable"))
-        source = log.source
-        if variable != log.given.get("variable"):
-            source = open_source(log.path, variable)
-        return replace(log, source=source, given={**log.given, **given}, **how)
+        how = {**how, "given": {**log.given, **given}}
+        if (variable := how["given"].get("variable")) != log.given.get("variable"):
+            how["source"] = open_source(log.path, variable)
+        same = all(getattr(log, name) == value for name, value in how.items())
+        return log if same else replace(log, **how)  # with its samples
     if isinstance(log, Source):
         return Log(log, given, **how)
     like = how.get("like")
