@@ -17,6 +17,11 @@ DIGITS = 4
 """Significant digits of a number in a table."""
 
 
+def number(value: Any) -> str:
+    """Write a number as in a table; anything else as it is."""
+    return f"{value:.{DIGITS}g}" if isinstance(value, float) else str(value)
+
+
 def tell_value(value: Any) -> None:
     """Print what a verb returns; a table with its title and its legend, unless it is quiet."""
     if isinstance(value, str):
@@ -42,8 +47,8 @@ def _tell_table(table: pd.DataFrame) -> None:
         for name, (first, *others) in zip(table.index, table.to_dict("split")["data"], strict=True):
             click.echo(f"{name}: {first}")
             for column, cell in zip(table.columns[1:], others, strict=True):
-                if cell == cell and cell != "":
-                    click.echo(f"    {column}: {cell}")
+                if cell == cell and cell not in (None, ""):
+                    click.echo(f"    {column}: {number(cell)}")
     else:
         shown = table.reset_index() if table.index.name else table
         texts = shown.select_dtypes(exclude=["number", "bool"]).astype(str)
@@ -54,7 +59,7 @@ def _tell_table(table: pd.DataFrame) -> None:
             index=False,
             justify="left",
             formatters=forms,
-            float_format=f"{{:.{DIGITS}g}}".format,
+            float_format=number,
             na_rep="-",
         )
         click.echo("\n".join(map(str.rstrip, text.splitlines())))
