@@ -378,7 +378,7 @@ WRONG = {
     "acs.diagnose(folder / 'sensor-0', seed=-1)": "seed: must be",
     "acs.read_calibration(folder)": "no such file",
     "acs.compare(one, 3)": "second: expected what `calibrate` or",
-    "acs.history(calibrations[:2])": "date",
+    "acs.history(calibrations[:3])": "date",
     "acs.history(calibrations[:3], dates=['2025-01-01'])": "1 date for 3 calibrations",
     "acs.lot([folder / 'sensor-0'])": "two sensors or more",
     "one.apply(table.iloc[:0])": "DataFrame: no row has three numbers",
