@@ -47,12 +47,6 @@ def test_the_registry_says_how_a_file_is_read(name):
         assert settings.means or settings.block is not None or timed
 
 
-def test_command_lists():
-    result = succeed("public")
-    for name, entry in public_data().items():
-        assert f"{name}: {entry.description}\n    {entry.licence}, {entry.url}\n" in result.output
-
-
 @needs_data
 def test_command(tmp_path):
     result = succeed("public", "mpu6050", "--out", tmp_path / "out", "--folder", DATA)

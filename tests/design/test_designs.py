@@ -78,7 +78,7 @@ def test_a_design_is_made_again_to_the_bit_and_replaces_nothing(tmp_path):
 def test_commands_take_the_file_for_a_scheme(made, tmp_path):
     path, _ = made
     name = get_scheme(str(path)).name
-    assert f"{name}  8" in succeed("schemes", "--approach", "robot", path).output
+    assert f"{name} 8 " in succeed("schemes", "--approach", "robot", path).output
     succeed("simulate-campaign", "--scheme", path, "--out", tmp_path / "c", "--name", "c")
     assert len((tmp_path / "c/positions.csv").read_text().splitlines()) == 9
     assert "visible" in succeed("effects", "--scheme", path, "--approach", "robot").output
