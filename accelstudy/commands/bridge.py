@@ -19,7 +19,7 @@ from typing import Any
 
 import click
 
-from accelstudy.basics.arguments import as_sequence, path_of
+from accelstudy.basics.arguments import as_sequence
 from accelstudy.basics.errors import OPTIONS
 from accelstudy.basics.names import matches
 from accelstudy.basics.progress import feedback
@@ -162,8 +162,6 @@ class Command(click.Command):
             raise
 
     def _act(self, *, quiet: bool = False, angle_unit: str | None = None, **given: Any) -> None:
-        if given.get("out") is not None:
-            given["out"] = path_of("--out", given["out"])
         with feedback(quiet), angles_in(angle_unit):
             self.run(**kinds.check(self.verb, given))
 

@@ -96,6 +96,14 @@ class Names(Kind):
         return items or super().shell_complete(ctx, param, incomplete)
 
 
+class FilePath(Kind):
+    """A path that a file can have; a command makes one of any text."""
+
+    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Any:
+        """Return the path."""
+        return path_of("path", value)
+
+
 def kind_of_annotation(said: Any) -> Kind:
     """Kind that an annotation names; a `Range` is one of whole numbers."""
     if isinstance(said, Range):
@@ -169,7 +177,7 @@ Quantity = float | str
 TEXT = kind_of_types("a text", str)
 FLAG = kind_of_types("True or False", bool)
 COLUMN = kind_of_types("the name of a column or its number", str, int, name="column")
-PATH = Kind(path_of, "path", files=True)
+PATH = FilePath(path_of, "path", files=True)
 SHARE = si("1", 0.5, 0.999)
 SHARE_OR_RMS = Kind(_share_or_rms, "share")
 GRAVITY = si("m/s^2", bounds.GRAVITY.least, bounds.GRAVITY.most)
