@@ -126,8 +126,8 @@ class TiltDistribution:
         """Quantiles of roll, of pitch and of the larger, (3, k), rad."""
         low, high = self.mean_squares.min(), self.mean_squares.max()
         squares = np.unique(np.concatenate([low * SQUARES, high * SQUARES]))
-        roll, pitch = shares = [self._share(angle, squares) for angle in (0, 1)]
-        both = roll * pitch + _dependence(*scipy.special.ndtri(shares), self._correlation)
+        roll, pitch = (self._share(angle, squares) for angle in (0, 1))
+        both = roll * pitch + _dependence(roll, pitch, self._correlation)
         wanted, at = scipy.special.ndtri(np.asarray(probabilities, dtype=float)), np.log(squares)
         scores = scipy.special.ndtri(_increasing([roll, pitch, both]))
         return np.exp([np.interp(wanted, each, at) / 2 for each in scores])
@@ -176,11 +176,12 @@ class TiltDistribution:
         return bool(np.all(offset < CENTRAL * self.mean_squares))
 
 
-def _dependence(x: Array, y: Array, correlation: float) -> Array:
-    """How much more often than if they were independent two normal variables are both below x, y.
+def _dependence(roll: Array, pitch: Array, correlation: float) -> Array:
+    """By how much the share of both exceeds the product of shares, of a normal copula.
 
-    It is the integral of their density over the correlation (Plackett 1954).
+    It is the integral of the normal density over the correlation (Plackett 1954).
     """
+    x, y = scipy.special.ndtri(roll), scipy.special.ndtri(pitch)
     nodes, weights = np.polynomial.legendre.leggauss(6)
     r = correlation * (1 + nodes[:, None]) / 2
     density = np.exp(-(x * x - 2 * r * x * y + y * y) / (2 * (1 - r * r))) / np.sqrt(1 - r * r)
