@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from functools import cache, partial
 from typing import TYPE_CHECKING
 
@@ -55,9 +55,9 @@ LEAST_REDUNDANCY = 0.25
 """Least share of redundant conditions; with fewer a wrong position would not be noticed."""
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Candidate:
-    """One calibration. Candidates are equal if they are of the same kind in the same positions.
+    """One calibration.
 
     Attributes
     ----------
@@ -78,11 +78,11 @@ class Candidate:
     scheme: Scheme
     hold: float
     sigma: float
-    tilt: Tilt = field(compare=False)
+    tilt: Tilt
     redundancy: int
-    search: Search | None = field(default=None, compare=False)
+    search: Search | None = None
     starts: int = 0
-    simulated: SimulatedTilt | None = field(default=None, compare=False)
+    simulated: SimulatedTilt | None = None
 
     @property
     def seconds(self) -> float:
