@@ -131,8 +131,8 @@ def photograph(browser, page, picture, size):
     """Take the top of a page as a picture of few colours."""
     tab = browser.new_page(viewport=dict(zip(("width", "height"), size, strict=True)))
     tab.goto(page.resolve().as_uri())
-    if tab.locator("#parameters").count():  # the table that a script of the page fills last
-        tab.wait_for_selector("#parameters tbody tr")
+    if tab.locator("#charts").count():  # what a script of the page fills last
+        tab.wait_for_selector("#charts svg")
         tab.wait_for_timeout(1000)
     tab.screenshot(path=picture)
     tab.close()

@@ -38,20 +38,24 @@ def explorer_charts(
     approaches, names = [*setups["approach"].unique()], [*fields] or ["model"]
     usual = next((name for name in names if name not in ("model", "scheme", "n")), "scheme")
     usual = usual if usual in names else names[0]
-    control = alt.binding_select(
-        options=names, labels=[*fields.values()], element="#by", name="Rows of the charts: "
-    )
-    by, chosen = alt.param(name="by", value=usual, bind=control), alt.param(name="chosen", value={})
     tilts = [tilt_chart(angle, approaches, names) for angle in ANGLES]
     sds = [sds_chart(unit, approaches, names) for unit in parameters["unit"].unique()]
-    whole = alt.vconcat(
-        alt.concat(*tilts).resolve_scale(x="shared"),
-        alt.concat(*sds),
-        datasets={"setups": records(setups), "parameters": records(parameters)},
-    )
-    whole = whole.configure(font="system-ui, sans-serif").configure_axis(labelFontSize=12)
-    whole = whole.configure_legend(orient="top", title=None, labelFontSize=12)
-    return dict(whole.add_params(by, chosen).to_dict())
+    control = {"input": "select", "element": "#by", "name": "Rows of the charts: "}
+    control |= {"options": names, "labels": [fields.get(name, name) for name in names]}
+    look = {"font": "system-ui, sans-serif", "axis": {"labelFontSize": 12}}
+    # Joined here, as Altair would copy and check all of it, and each row of the data, in seconds.
+    return {
+        "vconcat": [
+            {"concat": [chart.to_dict() for chart in tilts], "resolve": {"scale": {"x": "shared"}}},
+            {"concat": [chart.to_dict() for chart in sds]},
+        ],
+        "params": [
+            {"name": "by", "value": usual, "bind": control},
+            {"name": "chosen", "value": {}},
+        ],
+        "config": {**look, "legend": {"orient": "top", "title": None, "labelFontSize": 12}},
+        "datasets": {"setups": records(setups), "parameters": records(parameters)},
+    }
 
 
 def records(table: pd.DataFrame) -> list[dict[str, Any]]:

@@ -63,7 +63,9 @@ def explorer_page(study: Study, tables: Mapping[str, pd.DataFrame]) -> str:
     cells = tables["cells"]
     rows, titles = setups(cells, tables)
     names = ["model", "scheme", "n", *(factor.name for factor in NOISES)]
-    fields = {name: titles[name] for name in names if name in titles and len({*rows[name]}) > 1}
+    fields = {
+        name: titles[name] for name in names if name in titles and len({*rows[name].dropna()}) > 1
+    }
     shown = [i for i, name in enumerate(titles) if name in fields or name == "approach"]
     columns = [{"data": name, "title": title} for name, title in titles.items()]
     bundle = files("itables") / "html"
