@@ -178,7 +178,7 @@ def tab():
         options = ["--headless", "--no-sandbox", "--disable-gpu"]
         browser = playwright.chromium.launch(executable_path=path, args=options)
         opened = browser.new_page(viewport={"width": 1280, "height": 900})
-        opened.set_default_timeout(20_000)
+        opened.set_default_timeout(60_000)
         opened.amiss = []
         opened.on("pageerror", lambda error: opened.amiss.append(str(error)))
         opened.on(

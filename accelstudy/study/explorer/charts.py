@@ -40,8 +40,10 @@ def explorer_charts(
     usual = usual if usual in names else names[0]
     tilts = [tilt_chart(angle, approaches, names) for angle in ANGLES]
     sds = [sds_chart(unit, approaches, names) for unit in parameters["unit"].unique()]
-    control = {"input": "select", "element": "#by", "name": "Rows of the charts: "}
-    control |= {"options": names, "labels": [fields.get(name, name) for name in names]}
+    control = {
+        **{"input": "select", "element": "#by", "name": "Rows of the charts: "},
+        **{"options": names, "labels": [fields.get(name, name) for name in names]},
+    }
     look = {"font": "system-ui, sans-serif", "axis": {"labelFontSize": 12}}
     # Joined here, as Altair would copy and check all of it, and each row of the data, in seconds.
     return {
