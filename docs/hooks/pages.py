@@ -1,20 +1,25 @@
-"""What pages take from the code: the comment <!-- catalogue.schemes() --> gives way to its text.
-
-It names a module of this folder and a function in it.
-"""
+"""What pages take from the code: the comment <!-- catalogue.schemes() --> gives way to its text."""
 
 import json
 import re
 from ast import literal_eval
-from importlib import import_module
 
+import catalogue
+import file_formats
+import gallery
+import help_texts
 import quotes
+import schemas
 from mkdocs.structure.files import File
 
 from accelstudy.campaign.calibration.file_format import CalibrationDocument
 from accelstudy.epochs.file_format import HistoryDocument
 from accelstudy.lots.file_format import LotDocument
 
+MODULES = {
+    module.__name__: module
+    for module in (catalogue, file_formats, gallery, help_texts, quotes, schemas)
+}
 DOCUMENTS = (CalibrationDocument, HistoryDocument, LotDocument)
 """Files whose JSON Schema can be downloaded."""
 CALL = re.compile(r"^<!-- (\w+)\.(\w+)\((.*)\) -->$", re.MULTILINE)
@@ -36,4 +41,4 @@ def on_page_markdown(markdown, **_):
 
 def _called(call):
     module, function, arguments = call.groups()
-    return getattr(import_module(module), function)(*literal_eval(f"[{arguments}]")).strip("\n")
+    return getattr(MODULES[module], function)(*literal_eval(f"[{arguments}]")).strip("\n")

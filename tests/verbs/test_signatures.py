@@ -101,8 +101,8 @@ def test_what_is_printed_is_what_the_function_returns(tmp_path: Any) -> None:
             f"{name}: {first}" for name, first in table.iloc[:, 0].items()
         ]
     for name, row in accelstudy.cells(config).iterrows():
-        words = [name, str(row["redundancy"]), str(row["replicates"]), *row["reason"].split()]
-        assert words in [line.split() for line in said("cells", config).splitlines()]
+        row_said = [name, str(row["redundancy"]), str(row["replicates"]), *row["reason"].split()]
+        assert row_said in [line.split() for line in said("cells", config).splitlines()]
     for words, table in (
         (("schemes", "faces-6", "mclaren-24"), accelstudy.list_schemes(["faces-6", "mclaren-24"])),
         (("effects", "--scheme", "mclaren-24"), accelstudy.list_effects(scheme="mclaren-24")),
