@@ -57,13 +57,6 @@ def killed_notice(logs: Iterable[str]) -> str | None:
     )
 
 
-def lists(named: Any) -> dict[str, list[str]]:
-    """Input files by name, as lists; Snakemake makes a list of one file the file itself."""
-    return {
-        name: [files] if isinstance(files, str) else list(files) for name, files in named.items()
-    }
-
-
 @contextmanager
 def job(snakemake: Any) -> Iterator[dict[str, Any]]:
     """Run the body of a rule's script; yields the provenance of its outputs."""

@@ -16,7 +16,7 @@ from accelstudy.adjustment.linear_theory import LinearTheory
 from accelstudy.approaches import Approach, get_approach
 from accelstudy.basics.units import GON, MGON
 from accelstudy.design.estimability import Estimability, estimability
-from accelstudy.effects import HoldConditions, get_effect
+from accelstudy.effects import HoldConditions
 from accelstudy.leveling.error import ATTITUDES, MAX_TILT_GON, TiltError, cap_forces, tilt_error
 from accelstudy.schemes import Scheme, get_scheme
 from accelstudy.sensors.models import compose
@@ -143,11 +143,6 @@ class Cell:
         """SI unit of each parameter that is estimated; gravity is the last one if observed."""
         units = {p.name: p.unit for p in self.estimated_model.parameters}
         return {**units, "g": "m/s^2"} if self.noise.sigma_gravity > 0 else units
-
-    def columns_of(self, effect: str) -> list[int]:
-        """Numbers of the parameters of an effect that is estimated."""
-        names = list(self.parameter_units)
-        return [names.index(parameter.name) for parameter in get_effect(effect).parameters]
 
     @property
     def n_unknowns(self) -> int:

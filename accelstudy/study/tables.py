@@ -263,7 +263,7 @@ def _quantiles(statistics: CellStatistics) -> dict[str, Any]:
     }
 
 
-def collect(parts: Sequence[str | Path], cells: Sequence[str]) -> pd.DataFrame:
+def collect(parts: str | Path | Sequence[str | Path], cells: Sequence[str]) -> pd.DataFrame:
     """Join the parts of a table, with the rows of each cell in the order of the cells."""
     table = read_table(parts)
     at = table["cell"].astype(str).map({name: i for i, name in enumerate(cells)})
