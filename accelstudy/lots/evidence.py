@@ -1,13 +1,11 @@
-"""A sensor of a lot: the evidence of its campaign for everything that its model may lack.
-
-The mean of sensors that were in the same positions is one more sensor, with less noise.
-"""
+"""A sensor of a lot: the evidence of its campaign for everything that its model may lack."""
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from typing import Any
+from types import MappingProxyType
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -23,7 +21,7 @@ from accelstudy.diagnosis.evidence.noise_tests import LEVEL as LEVEL_OF_NOISE
 from accelstudy.diagnosis.evidence.sets import weigh_sets
 from accelstudy.diagnosis.evidence.size import Evidence, Level
 from accelstudy.diagnosis.rules import RULES
-from accelstudy.lots.noise import LEAST_SIGMA, NoisePrior
+from accelstudy.lots.noise import NoisePrior
 from accelstudy.sensors.sensor import SensorModel
 
 Array = NDArray[np.float64]
@@ -34,12 +32,10 @@ MAX_CONDITION_DIFFERENCE = 0.2
 """Largest difference of conditions that are the same, in parts of their range."""
 MAX_DIRECTION_DIFFERENCE = 0.15
 """Largest difference of the directions of forces in positions that are the same."""
+MIN_VARIANCE = 1e-12
+"""Least variance of unit weight that is divided by."""
 DRAWS = 1000
 """Number of simulated sets of residuals without any effect, for each campaign."""
-MIN_VARIANCE = 1e-300
-"""Least variance that is divided by."""
-COMMON = f"{UNKNOWN}(position → reading)"
-"""Name of an unnamed effect that the mean of all sensors shows."""
 
 
 @dataclass(frozen=True)
@@ -57,10 +53,9 @@ class SensorEvidence:
     specs : dict of effect to its best setting
     shapes : dict of lasting effects that show to their shapes
     tested : dict of what is tested to its log odds and, behind that, those in noise alone, (1 + s,)
-    residuals : (m,) array, m/s², of the means of the positions, equally uncertain
-    redundancy : int, of these
-    variance : float, (m/s²)², of a position mean, by the noise of the lot and the residuals
-    unit : float, variance of unit weight; 1 by the noise of the lot
+    z : (m,) array, residuals of unit weight
+    sigma : float, m/s², of a position mean, by which they were weighted
+    redundancy : int, of its calibration
     solution : Solution, of the campaign; None where it does not determine the model
     """
 
@@ -72,10 +67,9 @@ class SensorEvidence:
     specs: dict[str, str] = field(default_factory=dict)
     shapes: dict[str, tuple[str, ...]] = field(default_factory=dict)
     tested: dict[str, NDArray[np.float32]] = field(default_factory=dict)
-    residuals: Array = field(default_factory=lambda: np.zeros(0))
+    z: Array = field(default_factory=lambda: np.zeros(0))
+    sigma: float = 1.0
     redundancy: int = 0
-    variance: float = 1.0
-    unit: float = 1.0
     solution: Solution | None = None
 
 
@@ -126,7 +120,7 @@ def _weighed(sensor: Sensor) -> SensorEvidence:
     noise = sensor.noise
     problem = pose(sensor.fit(), np.random.SeedSequence(sensor.seed))
     detection, singles, chance = problem.detection, problem.singles, problem.chance
-    residuals, evidence, unknown = problem.residuals, problem.evidence, problem.unknown
+    residuals, evidence = problem.residuals, problem.evidence
     z, square = residuals.z, float(residuals.z @ residuals.z)
     # A sensor with a noise of its own is no usual one.
     usual = detection.noise if noise is None else detection.noise[:1]
@@ -138,26 +132,20 @@ def _weighed(sensor: Sensor) -> SensorEvidence:
         logs[LEVEL_OF_NOISE] = float(
             Evidence(doubted, evidence.redundancy).noise_density(square)[0]
         )
-    if unknown is not None:
-        logs |= {
-            f"{UNKNOWN}({coordinate} → {target})": float(log)
-            for (coordinate, target), log in unknown.place_densities(evidence, z).items()
-        }
     pairs = {}
     for pair in weigh_sets(singles.shapes, residuals, evidence, most=2):
         one, other = sorted(shape.name if shape.place is None else "" for shape in pair.best)
         if one:
             pairs[one, other] = pair.log_density - nothing
-    of_unit_weight = max(evidence.variance(square), MIN_VARIANCE)
     observed = [detection.densities[name] - nothing for name in problem.field.names]
     odds = np.vstack([observed, _by_chance(problem, chance, noise)]).astype(np.float32)
     return SensorEvidence(
         campaign=sensor.campaign.name,
         p_value=detection.p_value,
-        odds={name: log - nothing for name, log in logs.items()},
+        odds={name: log - nothing for name, log in logs.items()} | _unknown(problem, nothing),
         pairs=pairs,
         classes=tuple(one.members for one in problem.classes),
-        specs={name: best.effect.spec for name, best in singles.best.items() if best.place is None},
+        specs=_specs(problem),
         shapes={
             name: tuple(effect.spec for effect in effects)
             for name, shapes in problem.frame.candidates.items()
@@ -165,10 +153,9 @@ def _weighed(sensor: Sensor) -> SensorEvidence:
             and not effects[0].sudden
         },
         tested=dict(zip(problem.field.names, odds.T, strict=True)),
-        residuals=z * problem.base.sigma,
+        z=z,
+        sigma=problem.base.sigma,
         redundancy=residuals.redundancy,
-        variance=problem.base.sigma**2 * of_unit_weight,
-        unit=of_unit_weight if noise is None else 1.0,
         solution=problem.frame.solution,
     )
 
@@ -190,41 +177,71 @@ def _by_chance(problem: Problem, chance: Chance, noise: NoisePrior | None) -> Ar
     return odds(chance.errors(problem.residuals))
 
 
-def mean_sensor(sensors: Sequence[Sensor], said: Sequence[SensorEvidence]) -> Sensor | None:
-    """Average sensors that were in the same positions and conditions, in one order.
+class MeanEvidence(NamedTuple):
+    """What the mean residuals of sensors in the same positions show, which all of them have.
 
-    What all of them have is as large in their mean, and the noise is smaller by the root of their
-    number. Sensors whose noise is known by that of the lot have weights by it, and the others equal
-    ones. The noise of the mean is told by their scatter about it. None if the positions differ.
+    Attributes
+    ----------
+    p_value : float, of anything missing
+    odds : mapping of what has no name to its log odds
+    specs : mapping of effects to their best settings
     """
-    n, campaigns = len(sensors), [sensor.campaign for sensor in sensors]
-    if n < 2 or len({each.residuals.shape for each in said}) > 1:
-        return None
-    first = campaigns[0]
-    if not all(_alike(first, other) for other in campaigns[1:]):
-        return None
-    table = np.array([each.residuals for each in said])
-    variances = np.array([each.variance for each in said])
-    alone = np.array([sensor.noise is None for sensor in sensors])
-    if alone.any():  # an estimate of its own is no weight: one that is small by chance would count
-        variances[alone] = variances[alone].mean()
-    weights = variances.mean() / variances
-    freedom = (n - 1) * min(each.redundancy for each in said)
-    apart = table - np.average(table, axis=0, weights=weights)
-    within = float(np.sum(weights @ apart**2)) / freedom
-    sigma = max(float(np.sqrt(within / weights.sum())), LEAST_SIGMA)
-    columns: dict[str, Any] = {
-        name: np.average([getattr(one, name) for one in campaigns], axis=0, weights=weights)
-        for name in ("forces", *COLUMNS)
-        if getattr(first, name) is not None
-    }
-    if first.sigma_angle is not None:
-        columns["sigma_angle"] = first.sigma_angle * float(np.linalg.norm(weights) / weights.sum())
-    mean = replace(
-        first, name="mean of the lot", sd=None, n_samples=None, sigma_force=sigma, **columns
-    )
-    noise = NoisePrior(sigma, min(float(freedom), RULES.freedom_given), doubt=0.0)
-    return replace(sensors[0], campaign=mean, noise=noise)
+
+    p_value: float = 1.0
+    odds: Mapping[str, float] = MappingProxyType({})
+    specs: Mapping[str, str] = MappingProxyType({})
+
+
+NO_MEAN = MeanEvidence()
+"""Of sensors in different positions, nothing."""
+
+
+def weigh_mean(sensors: Sequence[Sensor], said: Sequence[SensorEvidence]) -> MeanEvidence:
+    """Weigh the mean residuals of sensors.
+
+    What all sensors have is as large in the mean, and the noise is smaller by the root of their
+    number. So it shows what has no name, too. Sensors that were in different positions or
+    conditions have no mean, nor have those with something sudden in their models, which each has
+    at a time of its own.
+
+    Parameters
+    ----------
+    sensors : all but odd ones
+    said : what they say
+    """
+    first, models = sensors[0].campaign, [sensor.model for sensor in sensors]
+    sudden = any(effect.sudden for model in models if model for effect in model.effects)
+    alike = len({one.z.shape for one in said}) == 1
+    if sudden or not alike or not all(_alike(first, each.campaign) for each in sensors):
+        return NO_MEAN
+    weights = np.array([1 / one.sigma for one in said])
+    weights /= np.linalg.norm(weights)
+    table = np.array([one.z for one in said])
+    z, freedom = weights @ table, (len(said) - 1) * said[0].redundancy
+    # The scatter about the mean tells the noise, whatever the campaigns state.
+    apart = float(np.sum((table - np.outer(weights, z)) ** 2)) / freedom
+    problem = pose(sensors[0].fit(), np.random.SeedSequence(sensors[0].seed))
+    level = Level((1.0,), (min(float(freedom), RULES.freedom_given),), known=True)
+    mean = replace(problem.residuals, errors=z / np.sqrt(max(apart, MIN_VARIANCE)))
+    frame = replace(problem.frame, residuals=mean)
+    problem = Problem(replace(problem.base, level=level), frame, problem.seed)
+    detection = problem.detection
+    nothing = float(np.logaddexp.reduce(detection.noise))
+    return MeanEvidence(detection.p_value, _unknown(problem, nothing), _specs(problem))
+
+
+def _unknown(problem: Problem, nothing: float) -> dict[str, float]:
+    """Log odds of functions without a name against nothing, by their places."""
+    if problem.unknown is None:
+        return {}
+    places = problem.unknown.place_densities(problem.evidence, problem.residuals.z).items()
+    return {f"{UNKNOWN}({of} → {target})": float(log) - nothing for (of, target), log in places}
+
+
+def _specs(problem: Problem) -> dict[str, str]:
+    """Effects in the settings that explain most."""
+    best = problem.singles.best.items()
+    return {name: one.effect.spec for name, one in best if one.place is None}
 
 
 def _alike(one: Campaign, other: Campaign) -> bool:

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
+import ctypes
 import math
-import os
 import signal
 import sys
 from collections.abc import Iterable, Iterator, Sequence
@@ -12,8 +12,7 @@ from concurrent.futures.process import BrokenProcessPool
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass, replace
 from functools import partial
-from multiprocessing import get_context
-from threading import Thread
+from multiprocessing import active_children, get_context
 
 from accelstudy.approaches import Approach
 from accelstudy.basics.errors import InputError
@@ -31,6 +30,8 @@ from accelstudy.sensors.sensor import SensorModel
 
 LEVEL_OF_REST = 0.01
 """Level of the test whether the model of a lot lacks more than what was found."""
+END_WITH_PARENT = 1
+"""Option of prctl(2) by which a process gets a signal when its parent ends, PR_SET_PDEATHSIG."""
 MAX_PASSES = 3
 """Largest number of passes that add effects to the model."""
 
@@ -130,7 +131,7 @@ def weigh_lot(
         for i, campaign in enumerate(campaigns)
     ]
     with _processes(cores, len(sensors)) as mapped:
-        passes, whole = [Pass.of(sensors, model, mapped)], model
+        passes, whole = [Pass.of(sensors, mapped)], model
         effects: list[LotEffect] = []
         for _ in range(MAX_PASSES):
             known = {effect.name for effect in whole.effects}
@@ -165,21 +166,20 @@ def _again(passes: Sequence[Pass], whole: SensorModel, mapped: Mapped) -> Pass |
         replace(sensor, model=_own(whole, passes, i)) for i, sensor in enumerate(passes[0].sensors)
     ]
 
-    def fitted(i: int, sigma: float | None = None) -> BaseFit | None:
-        noise = None if sigma is None else NoisePrior(sigma, RULES.freedom_given)
+    def fitted(i: int, noise: NoisePrior | None = None) -> BaseFit | None:
         with suppress(InputError):
             return replace(own[i], noise=noise).fit()
         return None
 
     fits = [fitted(i) for i in range(len(own))]
-    if not any(fits):
-        return None
-    # A campaign that does not determine the model says nothing of what else is missing.
-    sensors = [
-        replace(sensor, model=None if fit is None else fit.solution.model, noise=noise)
-        for sensor, fit, noise in zip(own, fits, noises_of_lot(fits, fitted), strict=True)
-    ]
-    return Pass.of(sensors, whole, mapped)
+    noises = noises_of_lot(fits, lambda i, sigma: fitted(i, NoisePrior(sigma, RULES.freedom_given)))
+    sensors = list[Sensor]()
+    for i, noise in enumerate(noises):
+        fit = fits[i] if noise is None else fitted(i, noise)
+        # A campaign that does not determine the model says nothing of what else is missing.
+        known = None if fit is None else fit.solution.model
+        sensors.append(replace(own[i], model=known, noise=noise))
+    return Pass.of(sensors, mapped) if any(one.model for one in sensors) else None
 
 
 def _own(whole: SensorModel, passes: Sequence[Pass], i: int) -> SensorModel:
@@ -224,26 +224,22 @@ def _processes(cores: int, n: int) -> Iterator[Mapped]:
     if cores == 1 or sys.platform != "linux":
         yield map
         return
-    # Workers read from a pipe to which nobody writes. It ends with this process, however that ends,
-    # and so do they; otherwise they would go on, and hold what they share with it.
-    reads, writes = os.pipe()
-    pool = ProcessPoolExecutor(
-        cores, mp_context=get_context("fork"), initializer=_work, initargs=(reads, writes)
-    )
-    try:
-        yield partial(pool.map, chunksize=min(4, -(-n // cores)))
-        pool.shutdown()
-    except BrokenProcessPool:
-        raise InputError(
-            "a process of the lot was killed, most likely because memory ran out; use fewer `cores`"
-        ) from None
-    finally:
-        os.close(writes)
-        pool.shutdown(cancel_futures=True)
-        os.close(reads)
+    others = {*active_children()}
+    with ProcessPoolExecutor(cores, get_context("fork"), _work) as pool:
+        try:
+            yield partial(pool.map, chunksize=min(4, -(-n // cores)))
+        except BrokenProcessPool:
+            raise InputError(
+                "a process of the lot was killed, most likely because memory ran out; "
+                "use fewer `cores`"
+            ) from None
+        except BaseException:
+            for worker in {*active_children()} - others:
+                worker.kill()
+            raise
 
 
-def _work(reads: int, writes: int) -> None:
+def _work() -> None:
     """Let a worker end with the process that it works for, which alone answers to Ctrl-C.
 
     Handlers that the program has for SIGTERM are no matter of a worker: it would outlive the signal
@@ -251,10 +247,4 @@ def _work(reads: int, writes: int) -> None:
     """
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     signal.signal(signal.SIGTERM, signal.SIG_DFL)
-    os.close(writes)
-
-    def wait() -> None:
-        os.read(reads, 1)
-        os._exit(1)
-
-    Thread(target=wait, daemon=True).start()
+    ctypes.CDLL(None).prctl(END_WITH_PARENT, signal.SIGKILL)

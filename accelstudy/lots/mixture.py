@@ -8,31 +8,30 @@ other. A set Z of effects of the lot has the evidence
 
 with r_i(s) the odds of the campaign of sensor i for the set s against nothing, and r̄_i their mean
 over all that could be missing: a sensor may be odd, and then have something of its own. Sets have
-up to three effects, and a sensor has up to two of them.
+up to two effects.
 
-These r_i take the sizes of the sensors for independent. As probable a priori is that a type has
-sizes, about which those of its sensors scatter more or less: then the r_i are the odds for sizes of
-the type (`sizes`). Of effects whose sizes are not looked at, one size in all sensors has the
-evidence of all campaigns as one.
+As probable as that each sensor has sizes of its own, of which its campaign has the odds, is a
+priori that a type has sizes, about which those of its sensors scatter more or less: then the r_i
+are the odds for sizes of the type (`sizes`). What has no name has none; if it is the same in all
+sensors, it has the odds of their mean.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
-from functools import cache, cached_property, partial
+from functools import cache, cached_property, reduce
 from itertools import combinations
-from typing import TypeAlias
+from typing import TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy import special
 
-from accelstudy.lots.sizes import Names, TypicalSet
+from accelstudy.lots.sizes import Names, TypeSizes, most_likely
 
 Array = NDArray[np.float64]
-OddsOf: TypeAlias = Callable[[Names], Array]
-"""Log odds of the sensors for some effects together."""
+T = TypeVar("T")
 
 PRIOR_ODD = 0.01
 """Prior probability that a sensor is odd."""
@@ -43,15 +42,13 @@ PRIOR_ALL = 0.5
 PRIOR_ALIKE = 0.5
 """Prior probability that sizes are those of a type, with any scatter; else each has its own."""
 PRIOR_FURTHER = 0.3
-"""Prior probability of two effects rather than one, and of three rather than two."""
+"""Prior probability of two effects rather than one."""
 MAX_SINGLES, MAX_EXTENDED = 12, 3
-"""Effects of which pairs are tried, and pairs to which a third one is added."""
+"""Most probable effects of which pairs are tried, and of these the ones that are in every pair."""
 MIN_POSTERIOR = 1e-6
 """Posterior below which a set does not count."""
-NODES = {1: 64, 2: 24, 3: 12}
+NODES = {1: 64, 2: 24}
 """Nodes of the integral over each share below 1, by the number of effects."""
-BLOCK = 64
-"""Sensors that are integrated over the shares at once, so that memory does not follow the lot."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -63,37 +60,32 @@ class Mixture:
     odds : mapping of each effect to (n,) array, log odds of the sensors against nothing
     pairs : mapping of two effects to (n,) array, log odds of both together
     prior : mapping of each effect to its prior probability; these sum to 1
-    common : mapping of effects to the log odds that they are the same in all sensors
-    typical : mapping of one or two effects to odds with sizes of the type, for each scatter
+    common : mapping of what has no name to log odds that it is the same in all sensors
+    sizes : TypeSizes of effects; None if nothing is known of them
+    few : float, sensors up to which an effect makes these odd, and is none of the type
     """
 
     odds: Mapping[str, Array]
     pairs: Mapping[Names, Array]
     prior: Mapping[str, float]
-    common: Mapping[Names, float] = field(default_factory=dict)
-    typical: Mapping[Names, Sequence[TypicalSet]] = field(default_factory=dict)
-    _known: dict[Names, list[tuple[Array, OddsOf]]] = field(default_factory=dict, init=False)
+    common: Mapping[str, float] = field(default_factory=dict)
+    sizes: TypeSizes | None = None
+    few: float = 0.0
+    _known: dict[Names, list[tuple[Array, Array]]] = field(default_factory=dict, init=False)
 
     @cached_property
     def sets(self) -> dict[Names, float]:
         """Sets of effects of the lot with log of evidence times prior weight, strongest first."""
         found: dict[Names, float] = {(): np.log(1 - PRIOR_MISSING) + self._evidence(())}
         for name, prior in self.prior.items():
-            weight = np.log(PRIOR_MISSING * (1 - PRIOR_FURTHER)) + np.log(prior)
+            weight = np.log(PRIOR_MISSING * (1 - PRIOR_FURTHER) * prior)
             found[name,] = weight + self._evidence((name,))
         singles = sorted(self.prior, key=lambda name: -found[name,])[:MAX_SINGLES]
-        strongest: list[Names] = [(name,) for name in singles]
-        for size in (2, 3):
-            tried = {_with(s, name) for s in strongest for name in singles if name not in s}
-            if size == 2:
-                # What is small beside the strongest one may be nothing by itself.
-                first = strongest[:MAX_EXTENDED]
-                tried |= {_with(s, name) for s in first for name in self.prior if name not in s}
-            weight = PRIOR_MISSING * PRIOR_FURTHER ** (size - 1)
-            for names in sorted(tried):
-                each = np.log(special.comb(len(self.prior), size))
-                found[names] = np.log(weight) - each + self._evidence(names)
-            strongest = sorted(tried, key=lambda s: -found[s])[:MAX_EXTENDED]
+        weight, pairs = PRIOR_MISSING * PRIOR_FURTHER, special.comb(len(self.prior), 2)
+        for one, other in combinations(singles, 2):
+            if one in singles[:MAX_EXTENDED]:
+                both = min(one, other), max(one, other)
+                found[both] = np.log(weight / pairs) + self._evidence(both)
         return dict(sorted(found.items(), key=lambda item: -item[1]))
 
     @cached_property
@@ -104,6 +96,10 @@ class Mixture:
     def of_any(self, effects: Collection[str]) -> float:
         """Posterior probability that any of some effects is one of the lot."""
         return sum(p for names, p in self.posterior.items() if {*names} & {*effects})
+
+    def of_all(self, effects: Collection[str]) -> float:
+        """Posterior probability that all of some effects are of the lot."""
+        return sum(p for names, p in self.posterior.items() if {*names} >= {*effects})
 
     def share(self, name: str) -> tuple[float, float, float]:
         """Share of the sensors that have an effect: mean, and the interval that holds 95 %."""
@@ -140,12 +136,10 @@ class Mixture:
     def sensors_under(self, names: Names) -> tuple[dict[Names, Array], Array]:
         """Return what `sensors` has, if the model of the lot lacks some effects."""
         table = np.zeros((len(_subsets(names)) + 1, len(self._anything)))
-        for shares, (_, odds_of) in zip(self._shares(names), self._ways(names), strict=True):
-            weights, each = np.ravel(shares), []
-            for logs in self._contributions(names, odds_of):
-                of_each = np.exp(logs - np.logaddexp.reduce(logs))
-                each.append(of_each.reshape(*logs.shape[:2], -1) @ weights)
-            table += np.concatenate(each, axis=1)
+        for shares, (_, odds) in zip(self._shares(names), self._ways(names), strict=True):
+            logs = self._contributions(names, odds)
+            of_each = np.exp(logs - np.logaddexp.reduce(logs))
+            table += of_each.reshape(*table.shape, -1) @ np.ravel(shares)
         return dict(zip(_subsets(names), table[:-1], strict=True)), table[-1]
 
     def having(self, name: str) -> Array:
@@ -163,69 +157,53 @@ class Mixture:
         """Log odds of the sensors for some effects together, with sizes of each sensor, (n,)."""
         if not subset:
             return np.zeros(len(self._anything))
-        if subset in self.pairs:
-            return self.pairs[subset]
         # Two that were not weighed together say no more than the weaker one.
-        return np.asarray(np.min([self.odds[name] for name in subset], axis=0))
+        weaker = np.min([self.odds[name] for name in subset], axis=0)
+        return self.pairs.get(subset, np.asarray(weaker))
 
-    def _of_type(self, one: TypicalSet, subset: Names) -> Array:
-        """Log odds of the sensors with sizes of a type, (n,).
+    def _contributions(self, names: Names, odds: Array) -> Array:
+        """Log of what each of `_subsets`, and oddness, contributes, (s + 1, n, nodes ...).
 
-        A sensor that is not usual, whose noise may be another one as well, says no more than by
-        itself.
+        Parameters
+        ----------
+        names : some effects
+        odds : (s, n) array, log odds of the sensors for each of their subsets
         """
-        odds = one.odds[subset]
-        return np.where(one.usual, odds, np.minimum(odds, self._of_own_sizes(subset)))
-
-    def _contributions(self, names: Names, odds_of: OddsOf) -> Iterator[Array]:
-        """Log of what each of `_subsets`, and oddness, contributes: (s + 1, b, nodes ...) arrays.
-
-        Each is of b sensors.
-        """
-        nodes, size = _nodes(len(names))[0], len(names)
-        shares = dict(zip(names, np.meshgrid(*[nodes] * size, indexing="ij"), strict=True))
-        priors = [
-            sum(
-                (np.log(rho) if name in subset else _log_of_rest(rho)
-                 for name, rho in shares.items()),
-                np.full((len(nodes),) * size, np.log(1 - PRIOR_ODD)),
-            )
-            for subset in _subsets(names)
-        ]  # fmt: skip
-        prior = np.array([*priors, np.full_like(priors[0], np.log(PRIOR_ODD))])[:, None]
-        odds = np.array([*map(odds_of, _subsets(names)), self._anything])
-        for first in range(0, odds.shape[1], BLOCK):
-            some = odds[:, first : first + BLOCK]
-            yield some.reshape(*some.shape, *[1] * size) + prior
-
-    def _log_likelihood(self, names: Names, odds_of: OddsOf) -> Array:
-        """Log likelihood of shares times their prior weights, (nodes ...)."""
-        each = self._contributions(names, odds_of)
-        logs = sum(np.logaddexp.reduce(logs).sum(axis=0) for logs in each)
-        return np.asarray(logs + _log_weights(len(names)))
+        each = np.array([*odds, self._anything])
+        return each.reshape(*each.shape, *[1] * len(names)) + _priors(len(names))
 
     def _evidence(self, names: Names) -> float:
         """Log evidence of effects, whatever their sizes."""
         return float(special.logsumexp([logs for logs, _ in self._ways(names)]))
 
-    def _ways(self, names: Names) -> list[tuple[Array, OddsOf]]:
-        """Log evidence by the ways in which sizes differ, (nodes ...) of shares, and odds then."""
+    def _ways(self, names: Names) -> list[tuple[Array, Array]]:
+        """Log evidence by the ways in which sizes differ, (nodes ...) of shares, and odds then.
+
+        The odds are those of `_contributions`. Of a sensor that is not usual, whose noise may be
+        another one as well, sizes of the type say no more than it says by itself.
+        """
         if names in self._known:
             return self._known[names]
-        own, types = self._of_own_sizes, self.typical.get(names, ())
-        logs = self._log_likelihood(names, own)
-        if types:
-            logs = logs + np.log(1 - PRIOR_ALIKE)
-        elif names in self.common:
-            # Which of the sensors have it, is not asked then.
-            alone, alike = special.logsumexp(logs), self.common[names]
-            both = np.logaddexp(np.log(1 - PRIOR_ALIKE) + alone, np.log(PRIOR_ALIKE) + alike)
-            logs = logs + both - alone
-        ways: list[tuple[Array, OddsOf]] = [(logs, own)]
+        types = [] if self.sizes is None else self.sizes.of_set(names)
+        own = np.array([self._of_own_sizes(subset) for subset in _subsets(names)])
+        if types and min(most_likely(types).shares.values()) * own.shape[1] <= self.few:
+            types = []
+        odds, priors = [own], [np.log(1 - PRIOR_ALIKE) if types else 0.0]
         for one in types:
-            odds = partial(self._of_type, one)
-            prior = np.log(PRIOR_ALIKE / len(types)) + one.cost
-            ways.append((prior + self._log_likelihood(names, odds), odds))
+            assert self.sizes is not None
+            alike = np.array([one.odds[subset] for subset in _subsets(names)])
+            odds.append(np.where(self.sizes.usual, alike, np.minimum(alike, own)))
+            priors.append(np.log(PRIOR_ALIKE / len(types)) + one.cost)
+        weights, ways = _log_weights(len(names)), list[tuple[Array, Array]]()
+        for each, prior in zip(odds, priors, strict=True):
+            logs = np.logaddexp.reduce(self._contributions(names, each)).sum(axis=0)
+            ways.append((logs + weights + prior, each))
+        if len(names) == 1 and names[0] in self.common:
+            # Which of the sensors have it, is not asked then.
+            ((logs, _),) = ways
+            alone, same = special.logsumexp(logs), self.common[names[0]]
+            both = np.logaddexp(np.log(1 - PRIOR_ALIKE) + alone, np.log(PRIOR_ALIKE) + same)
+            ways = [(logs + both - alone, own)]
         self._known[names] = ways
         return ways
 
@@ -234,14 +212,10 @@ class Mixture:
         return np.asarray(special.softmax([logs for logs, _ in self._ways(names)]))
 
 
-def _with(names: Names, name: str) -> Names:
-    """Set with one effect more."""
-    return tuple(sorted([*names, name]))
-
-
-def _subsets(names: Names) -> list[Names]:
-    """Subsets of some effects that a sensor may have: up to two effects."""
-    return [s for r in range(min(len(names), 2) + 1) for s in combinations(names, r)]
+def _subsets(names: Iterable[T]) -> list[tuple[T, ...]]:
+    """Subsets of some effects, all of which a sensor may have."""
+    given = [*names]
+    return [s for r in range(len(given) + 1) for s in combinations(given, r)]
 
 
 @cache
@@ -249,6 +223,24 @@ def _nodes(size: int) -> tuple[Array, Array]:
     """Nodes and weights of the integral over a share, if there are `size` of them."""
     nodes, weights = np.polynomial.legendre.leggauss(NODES[size]) if size else np.zeros((2, 0))
     return np.append((nodes + 1) / 2, 1.0), np.append((1 - PRIOR_ALL) * weights / 2, PRIOR_ALL)
+
+
+@cache
+def _priors(size: int) -> Array:
+    """Log of the prior of each of the subsets of `size` effects, and of oddness, by the shares.
+
+    Returns
+    -------
+    (s + 1, 1, nodes ...) array
+    """
+    nodes = _nodes(size)[0]
+    shares, usual = np.meshgrid(*[nodes] * size, indexing="ij"), np.zeros((len(nodes),) * size)
+    usual += np.log(1 - PRIOR_ODD)
+    priors = [
+        sum((np.log(r) if k in has else _log_of_rest(r) for k, r in enumerate(shares)), usual)
+        for has in _subsets(range(size))
+    ]
+    return np.array([*priors, np.full_like(usual, np.log(PRIOR_ODD))])[:, None]
 
 
 def _log_of_rest(share: Array) -> Array:
@@ -260,47 +252,30 @@ def _log_of_rest(share: Array) -> Array:
 @cache
 def _log_weights(size: int) -> Array:
     """Log of prior weights of the nodes of all shares, (nodes ...)."""
-    weights = np.ones(())
-    for _ in range(size):
-        weights = np.multiply.outer(weights, _nodes(size)[1])
-    return np.asarray(np.log(weights))
+    return np.asarray(np.log(reduce(np.multiply.outer, [_nodes(size)[1]] * size, np.ones(()))))
 
 
-class LotTest:
-    """The test whether anything is missing in a lot, to which sensors are added one by one.
+def p_value(
+    tested: Sequence[Mapping[str, NDArray[np.float32]]], weights: Mapping[str, float]
+) -> float:
+    """Probability that sensors without anything missing would show as much evidence.
 
-    The statistic is the evidence that a share of the sensors has one effect. Lots of
-    simulated noise say how large it is if nothing is missing.
+    The statistic is the evidence that a share of the sensors has one effect. Lots of simulated
+    noise say how large it is if nothing is missing.
 
-    Attributes
+    Parameters
     ----------
-    logs : dict of what is tested to (1 + s, nodes) array, log likelihood of each share in the lot,
-        and in s lots of noise
+    tested : of each sensor, what is tested with its log odds and those in noise alone, (1 + s,)
+    weights : prior weights of what shares none with the others, relative to all of these
     """
-
-    def __init__(self, logs: Mapping[str, Array]) -> None:
-        self.logs = dict(logs)
-
-    def add(self, sensor: Mapping[str, NDArray[np.float32]], sign: float = 1.0) -> None:
-        """Add what a sensor says; or take it away."""
-        nodes, _ = _nodes(2)
-        for name, odds in sensor.items():
-            log = np.logaddexp(_log_of_rest(nodes), odds[:, None] + np.log(nodes))
-            self.logs[name] = self.logs.get(name, 0.0) + sign * log
-
-    def p_value(self, weights: Mapping[str, float]) -> float:
-        """Probability that sensors without anything missing would show as much evidence.
-
-        Parameters
-        ----------
-        weights : prior weights of what shares none with the others, relative to all of these
-        """
-        names = sorted(self.logs)
-        if not names:
-            return 1.0
-        prior = np.array([weights.get(name, 1 / len(names)) for name in names])
-        by_effect = [
-            special.logsumexp(self.logs[name] + np.log(_nodes(2)[1]), axis=-1) for name in names
-        ]
-        total = special.logsumexp(np.array(by_effect) + np.log(prior)[:, None], axis=0)
-        return float((1 + np.sum(total[1:] >= total[0])) / len(total))
+    names = sorted({name for sensor in tested for name in sensor})
+    if not names:
+        return 1.0
+    (nodes, prior_of_share), by_effect = _nodes(2), list[Array]()
+    for name in names:
+        each = (sensor[name][:, None] for sensor in tested if name in sensor)
+        logs = sum(np.logaddexp(_log_of_rest(nodes), odds + np.log(nodes)) for odds in each)
+        weight = weights.get(name, 1 / len(names))
+        by_effect.append(special.logsumexp(logs + np.log(prior_of_share * weight), axis=-1))
+    total = special.logsumexp(by_effect, axis=0)
+    return float((1 + np.sum(total[1:] >= total[0])) / len(total))

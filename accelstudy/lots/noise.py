@@ -33,6 +33,8 @@ MIN_LOG_RATIO = 1.0
 """Difference of log likelihoods below which neither of two explanations is preferred."""
 ODD_SHARE, ODD_FREEDOM = 0.1, 1.0
 """Share of sensors whose variance may be anything, and ν of these."""
+DOUBT = 0.02
+"""Prior probability that a sensor has a noise of its own."""
 MIN_SENSORS = 3
 """Least number of sensors whose noise is compared."""
 STEP = 0.1
@@ -53,22 +55,17 @@ class NoisePrior:
     ----------
     sigma : float, m/s², of a position mean
     freedom : float, ν: few where sensors differ in noise
-    doubt : float, prior probability that the sensor has a noise of its own
     said : bool, whether its campaign says how large the noise is, which may be wrong then
     """
 
     sigma: float
     freedom: float
-    doubt: float = 0.02
     said: bool = True
 
     @property
     def level(self) -> Level:
         """What a campaign knows of its noise by that of the others."""
-        if not self.doubt:
-            return Level((1.0,), (self.freedom,), known=True)
-        weights = 1 - self.doubt, self.doubt
-        return Level(weights, (self.freedom, RULES.freedom_doubted), known=True)
+        return Level((1 - DOUBT, DOUBT), (self.freedom, RULES.freedom_doubted), known=True)
 
 
 def stated_sigma(fit: BaseFit) -> tuple[str, float]:

@@ -3,39 +3,28 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Callable, Iterator, Mapping, Sequence
-from contextlib import suppress
-from dataclasses import dataclass, field, replace
-from functools import cached_property, reduce
-from operator import add
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
 from typing import Any, NamedTuple, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
 
-from accelstudy.basics.errors import InputError
 from accelstudy.basics.progress import track
 from accelstudy.diagnosis.evidence.candidates import UNKNOWN
 from accelstudy.diagnosis.evidence.noise_tests import AXES, NOISES, TAILS
-from accelstudy.diagnosis.evidence.noise_tests import LEVEL as LEVEL_OF_NOISE
 from accelstudy.diagnosis.rules import RULES
 from accelstudy.lots.evidence import (
-    COMMON,
+    NO_MEAN,
+    MeanEvidence,
     Sensor,
     SensorEvidence,
     lot_classes,
-    mean_sensor,
+    weigh_mean,
 )
-from accelstudy.lots.mixture import LotTest, Mixture
-from accelstudy.lots.sizes import (
-    Equations,
-    Names,
-    PooledEffect,
-    TypeSizes,
-    most_likely,
-    weigh_pooled,
-)
-from accelstudy.sensors.sensor import SensorModel
+from accelstudy.lots.mixture import Mixture, p_value
+from accelstudy.lots.sizes import Derivatives, Names, TypeSizes
 
 Array = NDArray[np.float64]
 Mapped: TypeAlias = Callable[..., Iterator[Any]]
@@ -49,19 +38,18 @@ FALSE_ODD = 0.05
 MAX_ODD_SHARE = 0.1
 """Share of the sensors up to which an effect makes them odd, and does not belong to the type."""
 MIN_RIVAL = 0.02
-"""Least posterior probability of a rival."""
+"""Least posterior probability of a name that is reported with others."""
 MIN_CERTAIN = 0.95
-"""Posterior probability from which on a name is stated without its rivals."""
-UNTOLD, RESEMBLES = 6.0, 0.05
-"""Noncentrality of what an effect leaves beside another one, absolute and as a share of its own, up
-to which they are told together: on average the right one is 0.95 probable then."""
-MAX_SETS = 12
-"""Number of most probable sets of effects whose sizes are estimated."""
+"""Posterior probability of a set of names that are reported together, if no name is sure alone."""
+MAX_NAMES = 3
+"""Largest number of names in such a set."""
+EXCLUSIVE = 0.1
+"""Share of the posterior of a name up to which another one is missing beside it, and not in its
+place."""
 EFFECT = "effect"
 WEIGHTS = {
     EFFECT: 1.0,
     UNKNOWN: RULES.prior_unknown,
-    COMMON: RULES.prior_unknown,
     **dict.fromkeys(NOISES, RULES.prior_coloured),
     AXES: RULES.prior_axes,
     TAILS: RULES.prior_tails,
@@ -69,8 +57,6 @@ WEIGHTS = {
 """Prior weights of what the model of a lot may lack, relative to one effect of the catalogue."""
 ODD = "odd"
 """Name of an effect that one sensor has, and neither the model nor the other sensors."""
-IMPOSSIBLE = -30.0
-"""Log odds of an impossible hypothesis."""
 MIN_HAVING = 0.5
 """Posterior probability from which a sensor counts among those that have an effect."""
 
@@ -80,7 +66,7 @@ class LotEffect(NamedTuple):
 
     Attributes
     ----------
-    names : tuple of str, the names that mean the same in this lot, the most probable first
+    names : tuple of str, the names between which this lot does not decide, the most probable first
     posterior : float, given that the model lacks anything
     share : float, of the sensors
     share_ci95 : tuple of two floats
@@ -110,65 +96,62 @@ class Pass:
     ----------
     sensors : tuple of Sensor
     evidence : tuple of SensorEvidence, theirs
-    anything : LotTest, the test of them
-    mean : SensorEvidence, of their mean; None if they were in different positions
-    pooled : mapping of effects to what all campaigns say of them together
-    sizes : TypeSizes, of the most probable effects; None where there are none
+    sizes : TypeSizes, of effects that most sensors show; None where there are none
+    mean : MeanEvidence, of the sensors that are not odd
     """
 
     sensors: tuple[Sensor, ...]
     evidence: tuple[SensorEvidence, ...]
-    anything: LotTest
-    mean: SensorEvidence | None = None
-    pooled: Mapping[str, PooledEffect] = field(default_factory=dict)
     sizes: TypeSizes | None = None
+    mean: MeanEvidence = NO_MEAN
 
     @classmethod
-    def of(cls, sensors: Sequence[Sensor], whole: SensorModel, mapped: Mapped) -> Pass:
+    def of(cls, sensors: Sequence[Sensor], mapped: Mapped) -> Pass:
         """Weigh everything that the models of all sensors may lack.
 
         Parameters
         ----------
         sensors : with their models
-        whole : SensorModel, of their mean
         mapped : maps a function over the sensors
         """
-        n, said, anything = len(sensors), list[SensorEvidence](), LotTest({})
-        # What noise alone would say is most of what a sensor gives, and is not kept.
-        for one in track(mapped(Sensor.evidence, sensors), "evidence of the sensors", n):
-            anything.add(one.tested)
-            said.append(replace(one, tested={}))
-        # Nor are the fits, so that memory hardly follows the number of sensors.
-        now = cls(tuple(sensors), tuple(replace(one, solution=None) for one in said), anything)
-        usual = [i for i in now.usual if said[i].solution]
-        their = [said[i] for i in usual]
-        seed = sensors[0].seed - 1 if sensors[0].seed else n
-        mean = _evidence_of_mean([sensors[i] for i in usual], their, whole, seed)
-        now = replace(now, mean=mean, pooled=_pooled(their))
-        asked = now.strongest()
-        specs = {name: now.shapes[name] for names in asked for name in names}
-        if len(usual) < 2 or not specs:
-            return now
-        each = [Equations.of(one.solution, specs.values()) for one in said]
-        redundancy = sum(one.redundancy for one in their)
-        return replace(now, sizes=TypeSizes.of(each, specs, asked, usual, redundancy))
+        each = track(mapped(Sensor.evidence, sensors), "evidence of the sensors", len(sensors))
+        one = cls(tuple(sensors), tuple(each))
+        # What is common to all is that of the sensors which are not odd whatever their sizes.
+        usual = np.isin(np.arange(len(sensors)), one.usual)
+        some = [i for i in one.usual if one.evidence[i].solution]
+        said = [one.evidence[i] for i in some]
+        if len(some) < 2:
+            return one
+        one = replace(one, mean=weigh_mean([sensors[i] for i in some], said))
+        first: dict[str, Sequence[str]] = {}
+        for shown in said:
+            first = {**shown.shapes, **first}
+        count = Counter(name for shown in said for name in shown.shapes)
+        refined = {name: (spec,) for name, spec in one.mean.specs.items()}
+        shapes = {
+            name: (*first[name], *refined.get(name, ()))
+            for name in sorted(first)
+            if 2 * count[name] > len(said)
+        }
+        if not shapes:
+            return one
+        specs = [spec for tried in shapes.values() for spec in tried]
+        told = [Derivatives.of(each.solution, specs) for each in one.evidence]
+        redundancy = sum(shown.redundancy for shown in said)
+        return replace(one, sizes=TypeSizes.of(told, shapes, usual, redundancy))
 
     @cached_property
     def classes(self) -> dict[str, tuple[str, ...]]:
         """Classes of names that mean the same in this lot, by the first of each."""
-        of_mean = {} if self.mean is None else {COMMON: (COMMON,)}
-        return lot_classes(self.evidence) | of_mean
+        return lot_classes(self.evidence)
 
     @cached_property
     def mixture(self) -> Mixture:
         """Posterior of all sets of effects."""
         odds = {
-            # One sensor alone never shows what has neither a name nor a shape.
-            name: np.array([
-                one.odds.get(name, IMPOSSIBLE if name == COMMON else 0.0) for one in self.evidence
-            ])
+            name: np.array([one.odds.get(name, 0.0) for one in self.evidence])
             for name in self.classes
-        }  # fmt: skip
+        }
         first = {name: one for one, members in self.classes.items() for name in members}
         pairs: dict[Names, Array] = {}
         for i, one in enumerate(self.evidence):
@@ -187,39 +170,17 @@ class Pass:
         counts = Counter(kinds.values())
         total = sum(WEIGHTS[kind] for kind in counts)
         prior = {name: WEIGHTS[kind] / counts[kind] / total for name, kind in kinds.items()}
-        common: dict[Names, float] = {(name,): one.odds for name, one in self.pooled.items()}
-        if (mean := self.mean) is not None:
-            common |= {(n,): log for n, log in mean.odds.items() if n.startswith(UNKNOWN)}
-            # What is larger than noise in the mean is no noise.
-            common[COMMON,] = mean.odds[LEVEL_OF_NOISE]
-        sets, n = {} if self.sizes is None else self.sizes.sets, len(self.sensors)
-        typical = {
-            names: alike
-            for names, alike in sets.items()
-            if min(most_likely(alike).shares.values()) * n > self._few
-        }
-        return Mixture(odds, pairs, prior, common, typical)
-
-    @cached_property
-    def shapes(self) -> dict[str, str]:
-        """Effects in the settings that explain most of what all sensors have in common."""
-        of_mean = {} if self.mean is None else self.mean.specs
-        return {name: of_mean.get(name, one.spec) for name, one in self.pooled.items()}
-
-    def strongest(self) -> list[Names]:
-        """Return the most probable sets of one and two effects, and each of their effects."""
-        best = [*self.mixture.sets][:MAX_SETS]
-        sets = dict.fromkeys([*((name,) for names in best for name in names), *best])
-        return [s for s in sets if 0 < len(s) < 3 and all(name in self.shapes for name in s)]
+        return Mixture(odds, pairs, prior, self.mean.odds, self.sizes, self._few)
 
     @cached_property
     def p_value(self) -> float:
         """Probability that sensors without anything missing would show as much evidence.
 
-        It is that of the sensors or of their mean, whichever is the smaller one, for both.
+        It is that of the sensors or of their mean, if they have one, whichever is the smaller one,
+        for both.
         """
-        each = self.anything.p_value({UNKNOWN: RULES.prior_unknown})
-        return each if self.mean is None else min(2 * min(each, self.mean.p_value), 1.0)
+        each = p_value([one.tested for one in self.evidence], {UNKNOWN: RULES.prior_unknown})
+        return each if self.mean is NO_MEAN else min(2 * min(each, self.mean.p_value), 1.0)
 
     @property
     def missing(self) -> bool:
@@ -251,9 +212,10 @@ class Pass:
         for name, given in self.given.items():
             if name in taken or name in self._rare or given < MIN_RIVAL:
                 continue
-            rivals = [] if given >= MIN_CERTAIN else self._rivals(name)
-            alike = [name, *(rival for rival in rivals if rival not in taken)]
+            alike = self._credible_set(name, taken)
             posterior = min(self.mixture.of_any(alike) / self.wrong, 1.0)
+            if posterior < MIN_CERTAIN:
+                alike, posterior = [name], given
             if posterior >= RULES.sure:
                 taken.update(alike)
                 members = tuple(member for one in alike for member in self.classes[one])
@@ -261,22 +223,17 @@ class Pass:
                 found.append(LotEffect(members, posterior, share, (low, high), self.spec(name)))
         return found
 
-    def _rivals(self, name: str) -> list[str]:
-        """Effects that all campaigns together hardly tell from one that is not certain."""
-        if self.sizes is None:
-            return []
-        asked = self.sizes.asked
-        names = next((s for s in self.mixture.sets if name in s and s in asked), None)
-        if names is None or names not in self.mixture.typical:
-            return []
-        rivals = []
-        for rival in self.classes:
-            if self.given[rival] < MIN_RIVAL or rival in names or rival not in self.sizes.specs:
-                continue
-            left, whole = self.sizes.apart(names, name, rival)
-            if left < min(UNTOLD, RESEMBLES * whole):
-                rivals.append(rival)
-        return rivals
+    def _credible_set(self, name: str, taken: set[str]) -> list[str]:
+        """Name with those that may be missing in its place, until one of them is certain to be."""
+        alike, mixture = [name], self.mixture
+        for rival, given in self.given.items():
+            certain = mixture.of_any(alike) >= MIN_CERTAIN * self.wrong
+            if certain or given < MIN_RIVAL or len(alike) == MAX_NAMES:
+                break
+            beside = max(mixture.of_all({rival, one}) for one in alike)
+            if rival not in {*alike, *taken} and beside < EXCLUSIVE * mixture.of_any([rival]):
+                alike.append(rival)
+        return alike
 
     @cached_property
     def _rare(self) -> set[str]:
@@ -331,17 +288,12 @@ class Pass:
 
     def without_odd(self) -> Pass:
         """Return the pass without the odd sensors."""
-        if not self.odd:
-            return self
-        usual, anything = self.usual, LotTest(self.anything.logs)
-        for i in {*range(len(self.sensors))} - {*usual}:
-            anything.add(self.sensors[i].evidence().tested, -1.0)
-        return replace(
-            self,
-            sensors=tuple(self.sensors[i] for i in usual),
-            evidence=tuple(self.evidence[i] for i in usual),
-            anything=anything,
-            sizes=None if self.sizes is None else self.sizes.only(usual),
+        usual = self.usual
+        return Pass(
+            tuple(self.sensors[i] for i in usual),
+            tuple(self.evidence[i] for i in usual),
+            None if self.sizes is None else self.sizes.only(usual),
+            self.mean,
         )
 
     @cached_property
@@ -361,32 +313,3 @@ class Pass:
             if name in one.specs:
                 counted[one.specs[name]] += weight
         return max(counted, key=counted.__getitem__, default=None)
-
-
-def _pooled(used: Sequence[SensorEvidence]) -> dict[str, PooledEffect]:
-    """Weigh each effect that most sensors show by all campaigns as one.
-
-    Its shapes are those of the first campaign that shows it.
-    """
-    first: dict[str, Sequence[str]] = {}
-    for each in used:
-        first = {**each.shapes, **first}
-    counts = {name: sum(name in each.shapes for each in used) for name in sorted(first)}
-    shapes = {name: first[name] for name, count in counts.items() if 2 * count > len(used)}
-    if not shapes:
-        return {}
-    specs = [spec for one in shapes.values() for spec in one]
-    pooled = reduce(add, (Equations.of(each.solution, specs, each.unit) for each in used))
-    return weigh_pooled(pooled, sum(each.redundancy for each in used), shapes)
-
-
-def _evidence_of_mean(
-    sensors: Sequence[Sensor], said: Sequence[SensorEvidence], whole: SensorModel, seed: int
-) -> SensorEvidence | None:
-    """Weigh the mean of sensors; None if their model allows no mean."""
-    # What happens to each sensor at a time of its own has no mean.
-    if any(effect.sudden for effect in whole.effects) or not (mean := mean_sensor(sensors, said)):
-        return None
-    with suppress(InputError):  # the positions do not determine the model
-        return replace(mean, model=whole, seed=seed).evidence()
-    return None

@@ -55,34 +55,36 @@ class TypeParameter:
     usual: NDArray[np.bool_]
     has: NDArray[np.bool_]
 
+    @property
+    def told(self) -> NDArray[np.bool_]:
+        """Usual sensors that have it, and whose campaigns show it, (n,)."""
+        return self.usual & self.has & np.isfinite(self.values) & np.isfinite(self.sigmas)
+
     @cached_property
-    def of_type(self) -> RandomEffects | None:
-        """Mean and scatter over usual sensors that have it; None if no campaign shows it."""
-        told = self.usual & self.has & np.isfinite(self.values) & np.isfinite(self.sigmas)
-        if not told.any():
-            return None
-        design = np.ones((np.count_nonzero(told), 1))
-        return RandomEffects(self.values[told], self.sigmas[told] ** 2, design)
+    def of_type(self) -> RandomEffects:
+        """Mean and scatter over these sensors; those of one that is not known if there are none."""
+        values, sigmas = self.values[self.told], self.sigmas[self.told]
+        if not len(values):
+            values, sigmas = np.full((2, 1), np.nan)
+        return RandomEffects(values, sigmas**2, np.ones((len(values), 1)))
 
     @property
     def mean(self) -> float:
         """Mean of the type."""
-        return np.nan if self.of_type is None else float(self.of_type.estimates[0])
+        return float(self.of_type.estimates[0])
 
     @property
     def sigma(self) -> float:
         """Sigma of the mean."""
-        return np.nan if self.of_type is None else float(np.sqrt(self.of_type.covariance[0, 0]))
+        return float(np.sqrt(self.of_type.covariance[0, 0]))
 
     @property
     def scatter(self) -> float:
         """Scatter from sensor to sensor, an sd."""
-        return np.nan if self.of_type is None else self.of_type.scatter
+        return self.of_type.scatter
 
     def scatter_interval(self, probability: float) -> tuple[float, float]:
         """Interval that holds the scatter with a probability; that of one sensor has no end."""
-        if self.of_type is None:
-            return np.nan, np.nan
         return self.of_type.scatter_interval(probability) if self.of_type.dof else (0.0, np.inf)
 
     @property
@@ -147,7 +149,7 @@ def _typical(parameter: TypeParameter, sensors: int, stays: bool) -> TypicalPara
     sensors : int, that are usual and were calibrated
     stays : bool, whether it belongs to the sensor
     """
-    having = 0 if parameter.of_type is None else len(parameter.of_type.values)
+    having = np.count_nonzero(parameter.told)
     if not having:  # the campaigns of the other sensors tell of it
         parameter = replace(parameter, has=parameter.usual)
     _, below = parameter.scatter_interval(2 * BOUND_PROBABILITY - 1)

@@ -10,8 +10,9 @@ import accelstudy as acs
 from accelstudy.approaches import get_approach
 from accelstudy.diagnosis.evidence.size import Level
 from accelstudy.diagnosis.rules import RULES
-from accelstudy.lots.evidence import Sensor, SensorEvidence, mean_sensor
-from accelstudy.lots.noise import Agreement, NoisePrior, noises_of_lot
+from accelstudy.lots.evidence import NO_MEAN, Sensor, weigh_mean
+from accelstudy.lots.noise import Agreement, noises_of_lot
+from accelstudy.sensors.models import get_model
 
 N, REDUNDANCY = 16, 40
 QUIET, ROUGH = 3e-4, 2e-3
@@ -104,41 +105,25 @@ def test_the_noise_of_a_type_is_found_beside_an_odd_sensor(freedom):
     assert noise.freedom == pytest.approx(min(freedom, 200.0), rel=0.5)
 
 
-def test_the_mean_has_weights_by_known_noise_and_its_variance():
-    """Readings that differ by ±1 in units of their own noise, and those of two that have none."""
-    base = acs.simulate_campaign(name="s", seed=1)
-    sigmas = np.array([1e-3, 2e-3, 2e-3, 4e-3])
-    signs = np.array([1.0, -1.0, 1.0, -1.0])
-    campaigns = [
-        replace(base, forces=base.forces + s * e) for s, e in zip(sigmas, signs, strict=True)
-    ]
-    said = [
-        SensorEvidence("c", residuals=np.full(30, s * e), redundancy=30, variance=s**2)
-        for s, e in zip(sigmas, signs, strict=True)
-    ]
+def test_the_mean_of_a_lot_shows_what_all_sensors_have():
+    """A thermal bias that is too small for one sensor."""
 
-    def sensors_of(campaigns, noises):
-        approach = get_approach("robot")
-        return [
-            Sensor(campaign, None, approach, noise=noise)
-            for campaign, noise in zip(campaigns, noises, strict=True)
+    def lot(effect, n=6):
+        campaigns = [
+            acs.simulate_campaign(name=f"s{i}", seed=100 + i, temperature=(15, 35), effects=effect)
+            for i in range(n)
         ]
+        return [Sensor(c, get_model("bias-scale-nonorthogonality"), get_approach("robot"), i)
+                for i, c in enumerate(campaigns)]  # fmt: skip
 
-    def expected(variances):
-        weights = (1 / variances) / np.sum(1 / variances)
-        shift = weights @ (sigmas * signs)
-        squares = 30 * np.sum((sigmas * signs - shift) ** 2 / variances) / 90
-        return shift, np.sqrt(squares / np.sum(1 / variances)), weights
+    def weighed(sensors):
+        return weigh_mean(sensors, [sensor.evidence() for sensor in sensors])
 
-    known = [NoisePrior(s, RULES.freedom_given) for s in sigmas]
-    alone = np.append(sigmas[:2] ** 2, np.full(2, np.mean(sigmas[2:] ** 2)))
-    for noises, variances in ((known, sigmas**2), ([*known[:2], None, None], alone)):
-        shift, sigma, weights = expected(variances)
-        of_mean = mean_sensor(sensors_of(campaigns, noises), said)
-        mean, noise = of_mean.campaign, of_mean.noise
-        np.testing.assert_allclose(mean.forces - base.forces, shift, rtol=1e-6)
-        assert noise.sigma == pytest.approx(sigma)
-        assert mean.sigma_angle == pytest.approx(base.sigma_angle * np.sqrt(np.sum(weights**2)))
-    turned = replace(base, forces=base.forces[::-1])
-    for other in (turned, replace(base, time=None)):
-        assert mean_sensor(sensors_of([other, *campaigns[1:]], known), said) is None
+    assert weighed(lot(())).p_value > 0.01
+    small = lot(("thermal_bias: 1e-4, -1e-4, 1e-4",))
+    mean = weighed(small)
+    assert mean.p_value < 1e-3
+    assert max(mean.odds, key=mean.odds.get) == "unknown(temperature → bias)"
+    # There is none of sensors in different positions.
+    turned = [replace(one, campaign=replace(one.campaign, time=None)) for one in small[:1]]
+    assert weighed([*turned, *small[1:3]]) == NO_MEAN

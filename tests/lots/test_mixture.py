@@ -3,14 +3,12 @@
 from dataclasses import replace
 from functools import partial
 from itertools import combinations
-from types import SimpleNamespace
 
 import numpy as np
 import pytest
 from scipy import integrate, stats
 
-from accelstudy.diagnosis.evidence.size import SIZE_WEIGHTS, SIZES, Evidence, Level
-from accelstudy.diagnosis.rules import RULES
+from accelstudy.diagnosis.evidence.size import SIZE_WEIGHTS, SIZES
 from accelstudy.lots.evidence import SensorEvidence, lot_classes
 from accelstudy.lots.lot import LotDiagnosis
 from accelstudy.lots.mixture import (
@@ -19,17 +17,10 @@ from accelstudy.lots.mixture import (
     PRIOR_FURTHER,
     PRIOR_MISSING,
     PRIOR_ODD,
-    LotTest,
     Mixture,
 )
 from accelstudy.lots.passes import LEVEL, Pass
-from accelstudy.lots.sizes import (
-    SCATTERS,
-    Equations,
-    TypeSizes,
-    most_likely,
-    weigh_pooled,
-)
+from accelstudy.lots.sizes import SCATTERS, Derivatives, TypeSizes, most_likely
 from accelstudy.sensors.models import get_model
 
 STANDARD_ERRORS = 3.3
@@ -64,17 +55,15 @@ def mixture_of(odds, **known):
 
 def weighed(odds, rng):
     """A pass over sensors with these odds (n, 3), whose chances are those of their numbers."""
-    said, anything = [], LotTest({})
+    said = []
     for i, each in enumerate(odds):
         known = dict(zip(NAMES, each.tolist(), strict=True))
         pairs = {(a, b): known[a] + known[b] for a, b in combinations(NAMES, 2)}
         chance = odds_of(rng.standard_normal((CHANCES, len(NAMES))))
         tested = dict(zip(NAMES, np.vstack([each, chance]).T, strict=True))
-        one = SensorEvidence(f"sensor {i}", 0.5, known, pairs, [(n,) for n in NAMES], tested=tested)
-        said.append(one)
-        anything.add(tested)
-    sensors = [SimpleNamespace(evidence=partial(lambda one: one, one)) for one in said]
-    return Pass(tuple(sensors), tuple(said), anything)
+        classes = [(n,) for n in NAMES]
+        said.append(SensorEvidence(f"sensor {i}", 0.5, known, pairs, classes, tested=tested))
+    return Pass((None,) * len(said), tuple(said))
 
 
 def lot_of(lacks, rng):
@@ -88,12 +77,14 @@ def type_of(rng, sizes, like=0.0, first=0.0):
     d[..., 2] = like * d[..., 1] + np.sqrt(1 - like**2) * d[..., 2]
     z = np.einsum("nmk,nk->nm", d, sizes) + rng.standard_normal((len(sizes), ROWS))
     each = [
-        Equations(a.T @ a, a.T @ b, np.sum(a**2, axis=0), float(b @ b))
+        Derivatives(
+            {name: a[:, [k]] for k, name in enumerate(NAMES)},
+            {name: a[:, k] @ a[:, [k]] for k, name in enumerate(NAMES)}, b,
+        )
         for a, b in zip(d, z, strict=True)
-    ]
-    sets, n = [s for r in (1, 2) for s in combinations(NAMES, r)], len(sizes)
-    specs = dict(zip(NAMES, NAMES, strict=True))
-    return d, z, TypeSizes.of(each, specs, sets, range(n), n * ROWS)
+    ]  # fmt: skip
+    n = len(sizes)
+    return d, z, TypeSizes.of(each, {name: [name] for name in NAMES}, np.full(n, True), n * ROWS)
 
 
 def two_effects(rng, like=0.0, first=0.0):
@@ -138,8 +129,8 @@ def test_the_evidence_of_a_set_is_its_integral():
     }
     for names, value in expected.items():
         assert np.exp(mixture.sets[names]) == pytest.approx(value, rel=1e-6)
-    # An effect may as well be equally large in all sensors.
-    alike = replace(mixture, common={(one,): 3.0}).sets[one,]
+    # What has no name may as well be the same in all sensors.
+    alike = replace(mixture, common={one: 3.0}).sets[one,]
     value = (1 - PRIOR_ALIKE) * expected[one,] + PRIOR_ALIKE * alone * np.exp(3.0)
     assert np.exp(alike) == pytest.approx(value, rel=1e-6)
     # Each sensor lacks some set, or is odd.
@@ -166,23 +157,10 @@ def test_shares_and_sensors_are_so_as_often_as_is_said():
     assert_so_often(said, true, ((0.0, 0.2), (0.2, 0.6), (0.6, 0.9), (0.9, 1.0)), 0.03)
 
 
-def test_an_effect_of_one_size_is_weighed_by_all_campaigns_as_one():
-    """The evidence is that of one campaign with all residuals, by least squares."""
-    derivatives, z, _ = type_of(np.random.default_rng(8), np.full((4, 3), 0.3))
-    d, one = derivatives.reshape(-1, 3), z.ravel()
-    pooled = Equations(d.T @ d, d.T @ one, np.sum(d**2, axis=0), float(one @ one))
-    joint = weigh_pooled(pooled, 4 * ROWS, {"effect": ["thermal_bias"]})["effect"]
-    fitted = d @ np.linalg.lstsq(d, one, rcond=None)[0]
-    evidence = Evidence(Level((1.0,), (RULES.freedom_given,), known=True), 4 * ROWS)
-    part = evidence.spaces_density(np.array([fitted @ fitted]), [3], one @ one)[0]
-    assert joint.odds == pytest.approx(part - evidence.noise_density(one @ one)[0], rel=1e-6)
-    assert joint.spec == "thermal_bias"
-
-
 def test_odds_are_the_integral_over_the_sizes_of_the_type():
     _, _, _, sizes = two_effects(np.random.default_rng(1))
     both = NAMES[:2]
-    best = most_likely(sizes.sets[both])
+    best = most_likely(sizes.of_set(both))
     assert best.shares[NAMES[0]] > 0.9
     assert best.shares[NAMES[1]] == pytest.approx(1 / 3, abs=0.15)
 
@@ -190,7 +168,7 @@ def test_odds_are_the_integral_over_the_sizes_of_the_type():
         """Log of the mean of exp(ℓ) over normal sizes, by quadrature."""
         at = [NAMES.index(name) for name in names]
         normal, right = sizes.normal[i][np.ix_(at, at)], sizes.right[i][at]
-        mean = np.concatenate([of_type.sizes[name] for name in names])
+        mean = of_type.mean[at]
         # The trapezoidal rule is exact to rounding for what has ended at the limits.
         steps = np.linspace(-9, 9, 301)
         grid = np.stack(np.meshgrid(*[steps] * len(at), indexing="ij"), axis=-1)
@@ -200,7 +178,7 @@ def test_odds_are_the_integral_over_the_sizes_of_the_type():
         quadratic = np.einsum("nk,kl,nl->n", b, normal, b)
         return np.log(np.sum(density * np.exp(b @ right - quadratic / 2)))
 
-    for scatter, of_type in zip(SCATTERS, sizes.sets[both], strict=True):
+    for scatter, of_type in zip(SCATTERS, sizes.of_set(both), strict=True):
         for i, names in ((0, both[:1]), (20, both[1:]), (3, both)):
             expected = integral(of_type, i, names, scatter)
             assert of_type.odds[names][i] == pytest.approx(expected, rel=1e-3, abs=1e-3)
@@ -210,7 +188,7 @@ def test_a_size_that_is_fitted_costs_what_its_integral_says():
     """One size in all sensors: the evidence is the mean of the likelihood over the prior of it."""
     *_, sizes = type_of(np.random.default_rng(6), np.full((N, 3), [1.0, 0.0, 0.0]))
     alone = NAMES[:1]
-    of_type = sizes.sets[alone][SCATTERS.index(0.0)]
+    of_type = sizes.of_set(alone)[SCATTERS.index(0.0)]
     normal, right = sizes.normal[:, 0, 0].sum(), sizes.right[:, 0].sum()
     best, sigma = right / normal, 1 / np.sqrt(normal)
     size = best + sigma * np.linspace(-9, 9, 2001)
@@ -218,20 +196,6 @@ def test_a_size_that_is_fitted_costs_what_its_integral_says():
     prior = stats.norm.pdf(size[:, None], 0, sigma * np.sqrt(SIZES)) @ SIZE_WEIGHTS
     integral = np.log(np.sum(likelihood * prior) * (size[1] - size[0]))
     assert of_type.odds[alone].sum() + of_type.cost == pytest.approx(integral, abs=0.1)
-
-
-@pytest.mark.parametrize("like", [0.3, 0.99])
-def test_what_an_effect_leaves_beside_a_rival_is_that_of_least_squares(like):
-    _, d, _, sizes = two_effects(np.random.default_rng(3), like=like, first=0.8)
-    columns = d.reshape(-1, 3)
-    own, expected = 0.6 * columns[:, 1], []
-    for beside in ([0, 2], [0]):
-        others = columns[:, beside]
-        left = own - others @ np.linalg.lstsq(others, own, rcond=None)[0]
-        expected.append(left @ left / 3)
-    found = sizes.apart(NAMES[:2], *NAMES[1:])
-    assert found == pytest.approx(expected, rel=0.4)
-    assert found[0] / found[1] == pytest.approx(expected[0] / expected[1], rel=0.02)
 
 
 def test_the_noise_is_that_which_the_best_effects_leave():
@@ -272,7 +236,7 @@ def test_what_the_lot_lacks_is_named_and_what_one_sensor_lacks_makes_it_odd():
     true = np.zeros((20, 3))
     true[:, 0] = 0.6
     *_, sizes = type_of(rng, true)
-    rest = replace(one, sizes=replace(sizes, asked=[NAMES[:1]])).without_odd()
+    rest = replace(one, sizes=sizes.only([*range(20)])).without_odd()
     assert len(rest.sensors) == 19
     assert [*rest.classes] != [*one.classes]  # their order follows the evidence
     assert rest.p_value > one.p_value
@@ -287,6 +251,16 @@ def test_a_sensor_is_odd_though_a_second_one_shows_the_same_by_chance():
     one = weighed(odds, np.random.default_rng(6))
     assert one.found == []
     assert [(o.campaign, o.names) for o in one.odd] == [("sensor 9", (NAMES[1],))]
+
+
+def test_names_that_exclude_each_other_are_reported_as_one_set():
+    """Each sensor has one of two effects that it cannot tell apart, and the third by itself."""
+    odds = np.array([[12.0, 12.0, 12.0]] * 12)
+    both = [{**{pair: 12.0 for pair in combinations(NAMES, 2)}, NAMES[1:]: 24.0, NAMES[::2]: 24.0}]
+    one = weighed(odds, np.random.default_rng(7))
+    said = [replace(each, pairs=both[0]) for each in one.evidence]
+    found = replace(one, evidence=tuple(said)).found
+    assert [{*effect.names} for effect in found] == [{NAMES[2]}, {*NAMES[:2]}]
 
 
 def test_names_that_no_campaign_tells_apart_are_one_class():

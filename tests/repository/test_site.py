@@ -25,7 +25,6 @@ from accelstudy.epochs.file_format import HistoryDocument
 from accelstudy.lots.evidence import SensorEvidence
 from accelstudy.lots.file_format import LotDocument
 from accelstudy.lots.lot import LotDiagnosis
-from accelstudy.lots.mixture import LotTest
 from accelstudy.lots.output import Lot
 from accelstudy.lots.passes import Pass
 from accelstudy.sensors.models import get_model
@@ -127,12 +126,10 @@ def test_each_name_of_an_exported_calibration_is_described():
 
 def _lot():
     """Content of lot.json, of sensors that lack the same."""
-    name, anything = "thermal_bias", LotTest({})
-    each = [SensorEvidence(c, 0.5, {name: 20.0}, classes=((name,),)) for c in "abc"]
-    for _ in each:
-        anything.add({name: np.array([20.0, *[0.0] * 1000])})
+    name, tested = "thermal_bias", {"thermal_bias": np.array([20.0, *[0.0] * 1000])}
+    each = [SensorEvidence(c, 0.5, {name: 20.0}, classes=((name,),), tested=tested) for c in "abc"]
     sensors = (SimpleNamespace(noise=None),) * len(each)
-    one, model = Pass(sensors, tuple(each), anything), get_model("bias-scale")
+    one, model = Pass(sensors, tuple(each)), get_model("bias-scale")
     lot = LotDiagnosis((one, one), model, tuple(one.found))
     return Lot(lot, model, [None] * 3, {}).content
 
