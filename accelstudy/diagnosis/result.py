@@ -74,7 +74,6 @@ class NamedCause:
     name, spec : str; of a bumped position `spec` is the name
     position : int, of a bumped position
     equivalence_class : tuple of str, names that mean the same in this campaign
-    p_value : float, family-wise; None of a gross error that is recognised by its size
     posterior : float; None of what is no rival of the others
     parameters : tuple of Estimate; empty of what is no effect
     settings : tuple of Estimate, of those that were searched for
@@ -85,7 +84,6 @@ class NamedCause:
     spec: str
     position: int | None
     equivalence_class: tuple[str, ...]
-    p_value: float | None
     posterior: float | None
     parameters: tuple[Estimate, ...] = ()
     settings: tuple[Estimate, ...] = ()
@@ -221,7 +219,7 @@ class CampaignDiagnosis:
     def found(self) -> tuple[NamedCause, ...]:
         """All that was found; of the unknown, what is certain all the same."""
         gross = () if self.recognised is None else self.recognised.names
-        named = [NamedCause(name, name, at, (name,), None, None) for name, at in gross]
+        named = [NamedCause(name, name, at, (name,), None) for name, at in gross]
         if self.finding.verdict == "noise_model":
             return (*named, self._noise())
         return (*named, *self._chosen())
@@ -249,8 +247,7 @@ class CampaignDiagnosis:
         # Of larger residuals the level says least; what they are, the evidence says.
         if worst is not None and not (worst.name == LEVEL and posterior.p_noise >= RULES.sure):
             name = worst.name
-        p = self.detection.p_value if worst is None else worst.p_value
-        return NamedCause(name, name, None, (name,), p, posterior.p_noise)
+        return NamedCause(name, name, None, (name,), posterior.p_noise)
 
     def _chosen(self) -> list[NamedCause]:
         """What was chosen, with its estimates."""
@@ -267,10 +264,9 @@ class CampaignDiagnosis:
     ) -> NamedCause:
         """Describe a cause by the values of all parameters, and sigmas of the log settings."""
         best, members = cause.shape, cause.members
-        p = self.detection.p_family[UNKNOWN if best.name == LEARNED else best.name]
         if best.place is not None:
             at = int(self.campaign.positions[best.place])
-            return NamedCause(OUTLIER, OUTLIER, at, (OUTLIER,), p, cause.posterior)
+            return NamedCause(OUTLIER, OUTLIER, at, (OUTLIER,), cause.posterior)
         effect = best.distinguishable
         # What is beside a large effect was found in what its refit leaves.
         (here,) = (None,) if best.name == LEARNED else self.frame.hypotheses((best.effect,))
@@ -282,7 +278,6 @@ class CampaignDiagnosis:
             best.effect.spec,
             None,
             members,
-            p,
             cause.posterior,
             tuple(Estimate(q.name, *values[q.name], q.unit) for q in effect.parameters),
             tuple(Estimate(s.name, best.value, best.value * log, s.unit) for s, log in of_logs),

@@ -82,14 +82,12 @@ class Detection:
     p_value : float, probability of as much total evidence by noise alone
     densities : dict of candidate to log density of the residuals
     noise : (c,) array, log density of the residuals in noise alone, by the components of the level
-    p_family : dict of candidate to its p-value as the strongest of all
     by_chance, weights : (s,) arrays, S of simulated residuals, and their weights as noise alone
     """
 
     p_value: float
     densities: Mapping[str, float]
     noise: Array
-    p_family: Mapping[str, float]
     by_chance: Array
     weights: Array
 
@@ -105,30 +103,27 @@ def detect(field: Field, evidence: Evidence, residuals: Residuals, chance: Chanc
     """Test whether anything is missing."""
     if not field.candidates:
         noise = evidence.noise_density(residuals.z @ residuals.z)
-        return Detection(1.0, {}, noise, {}, np.zeros(0), np.zeros(0))
-    seen, k = field.project(residuals.z), len(field.names)
+        return Detection(1.0, {}, noise, np.zeros(0), np.zeros(0))
+    seen = field.project(residuals.z)
     densities, noise = field.densities(evidence, seen), evidence.noise_density(seen.squares)
     observed = densities - np.logaddexp.reduce(noise)
     drawn = field.project(chance.errors_with_effects(residuals, field.spaces))
     each = field.odds(evidence, drawn)
     ratio = np.exp(np.minimum(log_ratio(field.spaces, drawn.parts), 700.0))
     weights = 1 / (0.5 + 0.5 * ratio)
-    by_chance, strongest = log_mean(each), each.max(axis=1)
-    p_strongest = [tail_probability(strongest, weights, value, k) for value in observed]
+    by_chance = log_mean(each)
     return Detection(
         p_value=tail_probability(by_chance, weights, float(log_mean(observed))),
         densities=dict(zip(field.names, densities.tolist(), strict=True)),
         noise=noise,
-        p_family=dict(zip(field.names, p_strongest, strict=True)),
         by_chance=by_chance,
         weights=weights,
     )
 
 
-def tail_probability(values: Array, weights: Array, value: float, count: int = 1) -> float:
-    """Probability that log odds, or the largest of `count` of them, reach a value by chance."""
-    beyond = values >= value
-    bound = float(count * np.exp(min(-value, 0.0)))
+def tail_probability(values: Array, weights: Array, value: float) -> float:
+    """Probability that log odds reach a value by chance."""
+    beyond, bound = values >= value, float(np.exp(min(-value, 0.0)))
     if np.count_nonzero(beyond) >= RULES.enough:
         return float(min(np.sum(weights[beyond]) / len(weights), 1.0))
     least = np.sum(weights[values >= np.sort(values)[-RULES.enough]]) / len(weights)

@@ -57,10 +57,7 @@ def diagnosis_document(diagnosis: CampaignDiagnosis) -> dict[str, Any]:
         "screening": {
             "p_value": screening.p_value,
             "simulations": d.problem.chance.simulations,
-            "candidates": [
-                {"name": name, "p_family": p}
-                for name, p in sorted(screening.p_family.items(), key=lambda item: item[1])
-            ],
+            "candidates": [*screening.densities],
         },
         "posterior": d.probabilities,
         "credible_set": [_some(one, "names", "classes", "posterior") for one in d.credible_set],

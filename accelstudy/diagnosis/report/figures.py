@@ -9,16 +9,15 @@ import numpy as np
 import pandas as pd
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
-from matplotlib.ticker import MaxNLocator, NullLocator
+from matplotlib.ticker import MaxNLocator
 from numpy.typing import NDArray
 
 from accelstudy.basics.units import shown_unit, to_display
-from accelstudy.basics.wording import words
+from accelstudy.basics.wording import probability, words
 from accelstudy.diagnosis.decision.posterior import Explanation
 from accelstudy.diagnosis.evidence.candidates import UNKNOWN
 from accelstudy.diagnosis.report.document import condition_sigma
 from accelstudy.diagnosis.result import CampaignDiagnosis
-from accelstudy.diagnosis.rules import RULES
 from accelstudy.diagnosis.shape import TARGETS, LearnedShape, coordinate_of
 from accelstudy.diagnosis.space.shapes import coordinate_in_holds
 from accelstudy.drawing.style import (
@@ -45,7 +44,7 @@ def diagnosis_figures(
     """
     d = diagnosis
     figures: dict[str, Callable[[], Figure]] = {"residuals": lambda: residual_figure(d, positions)}
-    if d.detection.p_family:
+    if d.probabilities:
         figures["evidence"] = lambda: evidence_figure(d)
     if (shape := d.shape) is not None:
         figures["shape"] = lambda: shape_figure(shape)
@@ -146,66 +145,32 @@ def _draw_residuals(ax: Axes, positions: pd.DataFrame, when: str, abscissa: Arra
     ax.margins(y=0.08)
 
 
-MAX_CANDIDATES = 12
-"""Candidates in the figure of the evidence; weaker ones would only make it long."""
-SMALLEST_P = 1e-12
+MIN_DRAWN = 1e-3
+"""Least probability of a name that the figure has."""
 
 
 def evidence_figure(diagnosis: CampaignDiagnosis) -> Figure:
-    """Family-wise p-value and posterior probability of each candidate."""
-    p_values = diagnosis.detection.p_family
-    # A class of equal effects has its probability under one name, the rest has none.
-    probabilities = diagnosis.probabilities
-
-    def rank(name: str) -> tuple[float, float, str]:
-        return max(p_values.get(name, 1.0), SMALLEST_P), -probabilities.get(name, 0.0), name
-
-    names = sorted({*p_values, *probabilities}, key=rank)
-    shown = [name for name in names if name != UNKNOWN][:MAX_CANDIDATES]
-    shown += [
-        n for n in names if n not in shown and (probabilities.get(n, 0) > 0.05 or n == UNKNOWN)
-    ]
-    named = {name for f in diagnosis.found for name in (f.name, *f.equivalence_class)}
-    named |= set() if diagnosis.shape is None else {UNKNOWN}
-    colours = [AFTER if name in named else OTHER_COLOUR for name in shown]
-    labels = [words(name) for name in shown]
-    figure = new_figure(FULL, 22 + 4.4 * len(shown))
-    left, *right = figure.subplots(1, 1 + bool(probabilities), sharey=True, squeeze=False)[0]
-    tested = [max(p_values.get(name, np.nan), SMALLEST_P) for name in shown]
-    smallest = float(np.nanmin([*tested, 1.0]))
-    left.hlines(labels, tested, 1, color=colours, linewidth=1.2)
-    left.scatter(tested, labels, color=colours, s=18, zorder=3)
-    level = RULES.level(diagnosis.sigma_known)
-    left.axvline(level, color=BEFORE, linewidth=1, linestyle="--")
-    left.text(level, 1.0, f"level {level:g}", transform=left.get_xaxis_transform(),
-              color=BEFORE, ha="center", va="bottom", fontsize=7.5)  # fmt: skip
-    left.set_xscale("log")
-    left.set_xlim(2, min(0.3 * smallest, 1e-3))
-    left.xaxis.set_minor_locator(NullLocator())
-    left.set_xlabel("p-value alone, all candidates counted")
-    left.grid(axis="y", visible=False)
-    left.invert_yaxis()
-    for ax in right:
-        draw_shares(ax, {words(name): probabilities.get(name) for name in shown}, colours)
-        ax.set(xlim=(0, 115), xlabel="posterior probability, alone or with others / %")
+    """Posterior probability of each name, alone or with others."""
+    drawn = {n: p for n, p in diagnosis.probabilities.items() if p >= MIN_DRAWN}
+    found = {one.name for one in diagnosis.found} | ({UNKNOWN} if diagnosis.shape else set())
+    figure = new_figure(FULL, 22 + 4.4 * len(drawn))
+    ax = figure.subplots()
+    draw_shares(
+        ax,
+        {words(name): p for name, p in drawn.items()},
+        [AFTER if name in found else OTHER_COLOUR for name in drawn],
+    )
+    ax.set_xlabel("posterior probability, alone or with others")
     return figure
 
 
-def draw_shares(ax: Axes, shares: Mapping[str, float | None], colour: str | Sequence[str]) -> None:
-    """Draw probabilities as bars, with their names and numbers."""
-    drawn = ax.barh([*shares], [100 * (share or 0.0) for share in shares.values()], color=colour,
-                    height=0.6)  # fmt: skip
-    ax.bar_label(drawn, [_percent(share) for share in shares.values()], padding=2, fontsize=7.5)
-    ax.set_xticks([0, 25, 50, 75, 100])
+def draw_shares(ax: Axes, shares: Mapping[str, float], colour: str | Sequence[str]) -> None:
+    """Draw probabilities as bars, the first on top, with their names and numbers."""
+    drawn = ax.barh([*shares], [*shares.values()], color=colour, height=0.6)
+    ax.bar_label(drawn, [*map(probability, shares.values())], padding=2, fontsize=7.5)
+    ax.set(xlim=(0, 1.18), xlabel="posterior probability")
     ax.grid(axis="y", visible=False)
-
-
-def _percent(probability: float | None) -> str:
-    if probability is None:
-        return "shared"
-    if probability < 0.01:
-        return "< 1 %"
-    return "> 99 %" if probability > 0.99 else f"{100 * probability:.0f} %"
+    ax.invert_yaxis()
 
 
 def draw_explanations(ax: Axes, explanations: tuple[Explanation, ...]) -> None:
@@ -214,8 +179,6 @@ def draw_explanations(ax: Axes, explanations: tuple[Explanation, ...]) -> None:
         say_empty(ax, "nothing is missing")
         return
     draw_shares(ax, {"\nwith ".join(map(words, e.names)): e.posterior for e in explanations}, AFTER)
-    ax.set(xlim=(0, 118), xlabel="posterior probability / %")
-    ax.invert_yaxis()
 
 
 COMPONENTS = {

@@ -87,7 +87,7 @@ def badge(diagnosis: CampaignDiagnosis) -> str:
 
 def too_few(diagnosis: CampaignDiagnosis) -> bool:
     """Whether nothing was found since nothing could be tested."""
-    return diagnosis.verdict == "no_effect" and not diagnosis.detection.p_family
+    return diagnosis.verdict == "no_effect" and not diagnosis.detection.densities
 
 
 def noise_only(diagnosis: CampaignDiagnosis) -> float:
