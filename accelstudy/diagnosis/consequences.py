@@ -8,7 +8,7 @@ import numpy as np
 
 from accelstudy.adjustment.quality import Solution
 from accelstudy.basics.units import GON
-from accelstudy.diagnosis.prediction import relative_variance
+from accelstudy.diagnosis.held_out import relative_variance
 from accelstudy.effects import HoldConditions
 from accelstudy.leveling.error import (
     ATTITUDES,

@@ -1,45 +1,44 @@
-"""Whether a finding holds on positions that were used neither for choosing nor for fitting it."""
+"""Whether a finding holds on positions that were used neither for choosing nor for fitting it.
+
+Base model and extended model are fitted to some positions and predict the others. With r the
+misclosures of unit weight that the base model leaves there, A₂ their derivatives, C the cofactors
+of the base parameters and d = r − r' the correction that the extended model makes,
+
+    z = dᵀr / √(dᵀ (I + A₂ C A₂ᵀ) d)
+
+is standard normal if the base model is complete, whatever effect was chosen on the fitted
+positions.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from itertools import permutations
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.special import softmax
 
+from accelstudy.adjustment import Observations
 from accelstudy.adjustment.quality import Solution, solve
 from accelstudy.basics.errors import InputError
 from accelstudy.basics.progress import stage
-from accelstudy.diagnosis.decision.functions import (
-    SIZES,
-    fit_of_place,
-    most_probable_place,
-    weigh_place,
-)
-from accelstudy.diagnosis.decision.noise import exceeds_stated, judged_noise
+from accelstudy.diagnosis.decision.functions import fit_of_place, most_probable_place
 from accelstudy.diagnosis.decision.posterior import Posterior
 from accelstudy.diagnosis.decision.problem import Problem, pose
+from accelstudy.diagnosis.decision.refits import refit
 from accelstudy.diagnosis.decision.verdict import Finding
-from accelstudy.diagnosis.evidence.candidates import UNKNOWN, Cause, Projection
-from accelstudy.diagnosis.evidence.detection import draw_effects, log_ratio
-from accelstudy.diagnosis.evidence.size import log_mean
-from accelstudy.diagnosis.prediction import (
-    Group,
-    HeldOutGap,
-    LinearSplit,
-    held_out_gap,
-    relative_variance,
-    split_positions,
-)
+from accelstudy.diagnosis.evidence.candidates import UNKNOWN, Cause
+from accelstudy.diagnosis.evidence.noise_tests import exceeds_stated, judged_noise
 from accelstudy.diagnosis.rules import RULES
-from accelstudy.diagnosis.space.hypotheses import OUTLIER, Shapes, log_sum
+from accelstudy.diagnosis.space.hypotheses import Hypothesis
+from accelstudy.diagnosis.space.residuals import Residuals
 from accelstudy.diagnosis.space.shapes import Place
+from accelstudy.effects import HoldConditions
 
 Array = NDArray[np.float64]
-Ints = NDArray[np.int_]
 
 
 @dataclass(frozen=True)
@@ -71,14 +70,14 @@ class Gap:
         return "name" if len(self.names) == 1 else "effect"
 
 
-def gap_of(problem: Problem, finding: Finding, seeds: Sequence[np.random.SeedSequence]) -> Gap:
+def gap_of(problem: Problem, finding: Finding, seed: np.random.SeedSequence) -> Gap:
     """Compare the models on the positions to which they were fitted, and on held-out ones.
 
     Parameters
     ----------
     problem : Problem
     finding : Finding
-    seeds : of the split and of the simulated threshold
+    seed : SeedSequence, of the split
     """
     base, final = problem.base.solution, finding.frame.solution
     before = base.omega / base.redundancy
@@ -88,12 +87,10 @@ def gap_of(problem: Problem, finding: Finding, seeds: Sequence[np.random.SeedSeq
     if finding.verdict == "gross_error":
         return gap
     with stage("held-out positions"):
-        return _predict(problem, finding, gap, [np.random.default_rng(seed) for seed in seeds])
+        return _confirm(problem, finding, gap, np.random.default_rng(seed))
 
 
-def _predict(
-    problem: Problem, finding: Finding, gap: Gap, rngs: Sequence[np.random.Generator]
-) -> Gap:
+def _confirm(problem: Problem, finding: Finding, gap: Gap, rng: np.random.Generator) -> Gap:
     """Choose and fit on a part of the positions, and predict the rest."""
     first, place = problem.base.solution, finding.place
     n, c = len(first.misclosures), first.approach.n_conditions
@@ -106,26 +103,24 @@ def _predict(
             f"{fewest} are to be predicted, {needed + fewest} in all; there are {n}"
         )
         return replace(gap, reason=reason)
-    fitted, held = split_positions(problem.frame.forces, problem.frame.hold, count, rngs[0])
+    fitted, held = split_positions(problem.frame.forces, problem.frame.hold, count, rng)
     try:
         base = solve(first.model, first.approach, first.observed.take(fitted))
     except (InputError, np.linalg.LinAlgError):
         return replace(gap, reason="the fitted positions do not determine the model")
     part = pose(replace(problem.base, solution=base))
     chosen, others = _chosen_alike(part, finding)
-    refit = _refit(part, chosen, place)
-    if isinstance(refit, str):
-        return replace(gap, reason=refit)
+    refitted = _refit(part, chosen, place)
+    if isinstance(refitted, str):
+        return replace(gap, reason=refitted)
     known = problem.evidence.level.known
     variance = judged_noise(problem, finding.frame).variance if known else None
-    test = held_out_gap(base, refit, first.observed.take(held), held, variance)
+    rest = first.observed.take(held)
+    test = held_out_gap(base, refitted, rest, held, variance)
     if others:
         another = "effect" if place is None else "coordinate or target"
         reason = f"the fitted positions alone would have chosen another {another}"
         return replace(gap, held_out=test, reason=reason)
-    split = LinearSplit(problem.frame, fitted, held)
-    beyond = problem.detection.threshold(RULES.level(known))
-    test = replace(test, needed=threshold(problem, place, beyond, part, split, rngs[1]))
     gap = replace(gap, held_out=test, confirmed=test.significant)
     alone = finding.verdict == "named" and len(finding.chosen) == 1
     # Of what leaves more than the noise the name may be that of something that is not listed.
@@ -135,8 +130,24 @@ def _predict(
     # What was found, and all that could leave the same in this campaign.
     imitators = problem.frame.imitators(cause.shape)
     names = tuple(dict.fromkeys((cause.name, *cause.members, *imitators)))
-    sure = _prefers(names, problem, part, finding, split)
-    return replace(gap, names=names) if sure else gap
+
+    def log_density(best: Hypothesis) -> float:
+        """Log density of the held-out positions with an effect of the fitted ones."""
+        fit = refit(part.frame.solution, [best])
+        if fit is None:
+            return -np.inf
+        return -held_out_gap(base, fit, rest, held, variance).after * held.size * c / 2
+
+    rivals = [
+        (one.names[0], part.singles.best[one.names[0]])
+        for one in finding.posterior.reported[: RULES.held_out_rivals + 1]
+        if len(one.best) == 1 and one.best[0].place is None and one.names[0] in part.singles.best
+    ]
+    if not rivals:
+        return gap
+    shares = softmax([log_density(best) for _, best in rivals])
+    sure = sum(share for (name, _), share in zip(rivals, shares, strict=True) if name in names)
+    return replace(gap, names=names) if sure >= RULES.sure else gap
 
 
 def _chosen_alike(part: Problem, finding: Finding) -> tuple[Sequence[Cause], bool]:
@@ -196,165 +207,117 @@ def _place_of(part: Problem) -> Place | None:
     return None if found is None else found.place
 
 
-def _prefers(
-    group: Sequence[str], problem: Problem, part: Problem, finding: Finding, split: LinearSplit
-) -> bool:
-    """Whether held-out positions by themselves prefer some names to the other explanations."""
-    errors = problem.residuals.errors[None]
-    missed = split.base_residuals(errors)[1]
-    variance = 1.0 if part.evidence.level.known else part.residuals.variance
-    logs, of_group = [], []
-    for one in finding.posterior.reported[: RULES.held_out_rivals + 1]:
-        if len(one.best) == 1 and one.best[0].place is None:
-            (columns,) = problem.frame.columns(one.best)
-            left = missed - split.corrections(errors, [(0, columns, 0.0)])
-            logs.append(-float(np.sum(left**2)) / (2 * variance))
-            of_group.append(one.names[0] in group)
-    return bool(np.sum(softmax(logs)[of_group]) >= RULES.sure)
+# --- the prediction -----------------------------------------------------------------------------
 
 
-# --- what held-out positions must show: by simulation of the campaign itself --------------------
+@dataclass(frozen=True)
+class HeldOutGap:
+    """Evidence from held-out positions, in units of the noise variance.
 
-# Held-out positions take no part in choosing or fitting an effect. But a name is only given, or a
-# function learned, because all positions together, the held-out ones among them, seem to have
-# something that the model lacks. So if nothing is missing and it is said all the same, the held-out
-# positions support it more often than at 5 %.
-#
-# Noise gets a random effect, or a random function of the place that was learned, and is weighted
-# back to noise (importance sampling). Of the sets in which something is found and said, the fitted
-# positions choose an effect, or learn a function, and predict the others.
+    Attributes
+    ----------
+    before, after : float, mean square of the misclosures of the base and of the extended model
+    floor : float, what it would be with the right model
+    z : float
+    held : tuple of int, indices of the held-out positions
+    """
+
+    before: float
+    after: float
+    floor: float
+    z: float
+    held: tuple[int, ...]
+
+    @property
+    def significant(self) -> bool:
+        """Whether the correction is right."""
+        return self.z > RULES.z_confirmed
 
 
-def threshold(
-    problem: Problem,
-    place: Place | None,
-    beyond: float,
-    part: Problem,
-    split: LinearSplit,
-    rng: np.random.Generator,
-) -> float:
-    """Value that the statistic exceeds with 5 %, if nothing is missing and yet it was said.
+def split_positions(
+    forces: Array, hold: HoldConditions, count: int, rng: np.random.Generator
+) -> tuple[NDArray[np.int_], NDArray[np.int_]]:
+    """Split positions into fitted and held-out ones, alike in direction, time and temperature.
+
+    Of many random splits the one is taken whose two parts agree best in the first and second
+    moments. It depends on where and when was measured, never on the readings.
 
     Parameters
     ----------
-    problem : Problem, of all positions
-    place : Place, of which a function was learned in place of a name; None for a name
-    beyond : float, total evidence from which on something counts as missing
-    part : Problem, of the fitted positions
-    split : LinearSplit
+    forces : (n, 3) array, of an ideal sensor
+    hold : HoldConditions
+    count : int, positions to hold out
     rng : Generator
     """
-    label, residuals, field = labels(problem.classes), problem.residuals, problem.field
-    drawn: Shapes = field.spaces
-    if place is not None:
-        if problem.unknown is None or part.unknown is None:
-            return RULES.z_significant
-        drawn = problem.unknown.at([place])
-        if not len(drawn.dims):
-            return RULES.z_significant
-    added = draw_effects(drawn, RULES.threshold_sets, rng)
-    noise = rng.standard_normal(added.shape) + residuals.project(added.T).T
-    z = residuals.project(noise.T).T
-    seen = field.project(z)
-    odds = field.odds(problem.evidence, seen)
-    claimed = (
-        claimed_place(problem, z, seen, place) if place else claimed_names(odds, field.names, label)
-    )
-    sets = np.flatnonzero((claimed >= 0) & (log_mean(odds) > beyond))
-    if not len(sets):
-        return RULES.z_significant
-    weights = np.exp(-log_ratio(drawn, drawn.parts(z[sets])))
-    noise = noise[sets]
-    found, change = (
-        chosen_place(part, split, noise, place)
-        if place
-        else chosen_names(part, split, noise, label)
-    )
-    values = split.statistic(change, noise, part.evidence.level.known)
-    order = np.argsort(-values)
-    confirmed = np.where(found == claimed[sets], weights, 0.0)
-    rate = np.cumsum(confirmed[order]) / weights.sum()
-    at = min(int(np.searchsorted(rate, RULES.level_confirmed)), len(order) - 1)
-    return max(RULES.z_significant, float(values[order[at]]))
+    n = len(forces)
+    unit = forces / np.linalg.norm(forces, axis=1, keepdims=True)
+    columns = [*unit.T, *(unit[:, i] * unit[:, j] for i in range(3) for j in range(i + 1))]
+    for values in (hold.time, hold.temperature, hold.vibration):
+        if values is not None and np.ptp(values) > 0:
+            scaled = (values - np.mean(values)) / np.std(values)
+            columns += [scaled, scaled**2]
+    features = np.column_stack(columns)
+    scale = features.std(axis=0)
+    features = (features - features.mean(axis=0)) / np.where(scale > 0, scale, 1.0)
+    best, least = np.arange(n), np.inf
+    for _ in range(RULES.splits):
+        order = rng.permutation(n)
+        # The means of the two parts differ in proportion to the sum over either.
+        imbalance = float(np.sum(features[order[:count]].sum(axis=0) ** 2))
+        if imbalance < least:
+            best, least = order, imbalance
+    return np.sort(best[count:]), np.sort(best[:count])
 
 
-def labels(classes: Sequence[Cause]) -> dict[str, int]:
-    """Number of the class of each candidate; a bumped position has none."""
-    each = ((name, i) for i, one in enumerate(classes) for name in one.members)
-    return {name: i for name, i in each if name != OUTLIER}
-
-
-def claimed_names(odds: Array, names: Sequence[str], label: Mapping[str, int]) -> Ints:
-    """Class that residuals would be given as a name, alone or among few, (b,); −1 for none.
+def held_out_gap(
+    base: Solution,
+    extended: Solution,
+    rest: Observations,
+    held: NDArray[np.int_],
+    variance: float | None,
+) -> HeldOutGap:
+    """Predict positions by fits of two models to others.
 
     Parameters
     ----------
-    odds : (b, K) array, log odds of each candidate
-    names : of these
-    label : of `labels`
+    base, extended : Solution, of the same positions
+    rest : Observations, of the others
+    held : indices of the others, for the record
+    variance : float, of unit weight; None takes that of the base fit
     """
-    of = np.array([label.get(name, -1) for name in names])
-    classes = np.unique(of[of >= 0])
-    each = np.column_stack([*(odds[:, of == c].max(axis=1) for c in classes), odds[:, of < 0]])
-    p = softmax(each, axis=1)
-    few = np.sort(p, axis=1)[:, -RULES.many :].sum(axis=1) >= RULES.credible
-    top = np.append(classes, np.full(each.shape[1] - len(classes), -1))[np.argmax(p, axis=1)]
-    return np.where((p.max(axis=1) >= RULES.sure) | few, top, -1)
+    if variance is None:
+        variance = base.omega / base.redundancy
+    first, second = (_predict(solution, rest) for solution in (base, extended))
+    d = first.white - second.white
+    slope = d @ first.slope
+    size = float(d @ d + slope @ base.cofactors @ slope)
+    before, after = (float(np.mean(p.white**2)) / variance for p in (first, second))
+    cofactors = extended.cofactors / relative_variance(extended, base)
+    spread = float(np.einsum("mu,uv,mv->", second.slope, cofactors, second.slope))
+    return HeldOutGap(
+        before=before,
+        after=after,
+        floor=1 + spread / len(d),
+        z=float(d @ first.white / np.sqrt(size * variance)) if size > 0 else 0.0,
+        held=tuple(int(i) for i in held),
+    )
 
 
-def chosen_names(
-    part: Problem, split: LinearSplit, noise: Array, label: Mapping[str, int]
-) -> tuple[Ints, Array]:
-    """Class that the fitted positions choose of noise (b, m), and the corrections that it makes."""
-    field, z = part.named_field, split.residuals(part.residuals, noise)
-    seen, names = field.project(z), field.names
-    candidate = np.argmax(field.densities(part.evidence, seen), axis=1)
-
-    def groups() -> Iterator[Group]:
-        for k in np.unique(candidate):
-            if names[k] == OUTLIER:
-                continue
-            shapes, rows = field.candidates[names[k]], np.flatnonzero(candidate == k)
-            along = seen.parts[rows, field.starts[k] : field.starts[k + 1]]
-            logs = shapes.logs(part.evidence, along, seen.squares[rows])
-            places, which = np.unique(np.argmax(logs, axis=1), return_inverse=True)
-            tried = split.frame.columns([shapes[int(place)] for place in places])
-            for i, columns in enumerate(tried):
-                yield rows[which == i], columns, 0.0
-
-    found = np.array([label.get(names[k], -2) for k in candidate])
-    return found, split.corrections(noise, groups())
+def relative_variance(one: Solution, other: Solution) -> float:
+    """Ratio of the variances of unit weight of two fits that take different sigmas."""
+    taken = [float(np.mean(np.asarray(fit.observed.sigma_force))) for fit in (one, other)]
+    return (taken[0] / taken[1]) ** 2
 
 
-def claimed_place(problem: Problem, z: Array, seen: Projection, place: Place) -> Ints:
-    """Whether a function of a place would be learned of residuals z (b, m): 0, or −1 if not."""
-    field, evidence, unknown = problem.field, problem.evidence, problem.unknown
-    assert unknown is not None
-    prior = np.log(problem.prior_unknown)
-    densities = field.densities(evidence, seen)
-    densities[:, :-1] -= np.log(len(field.candidates))
-    densities[:, -1] += prior
-    of_place = unknown.place_densities(evidence, z)[place]
-    return np.where(np.exp(of_place + prior - log_sum(densities)) >= RULES.sure, 0, -1)
+class _Prediction(NamedTuple):
+    """Misclosures of unit weight in unused positions, (m,), and their derivatives, (m, u)."""
+
+    white: Array
+    slope: Array
 
 
-def chosen_place(
-    part: Problem, split: LinearSplit, noise: Array, place: Place
-) -> tuple[Ints, Array]:
-    """Whether the fitted positions choose a place for noise (b, m), 0, and its corrections."""
-    unknown, z = part.unknown, split.residuals(part.residuals, noise)
-    assert unknown is not None
-    each = unknown.place_densities(part.evidence, z)
-    most = np.max([*each.values()], axis=0)
-    found = np.where(each.get(place, np.full(len(z), -np.inf)) >= most, 0, -1)
-    shapes = weigh_place(place, part.frame, part.residuals, z, part.evidence)
-
-    def groups() -> Iterator[Group]:
-        best = np.argmax([log_sum(one.logs) for one in shapes], axis=0)
-        for i, one in enumerate(shapes):
-            sizes = np.argmax(one.logs, axis=1)
-            shown = split.frame.rows(one.effect) * one.effect.deviations
-            for size in np.unique(sizes[best == i]):
-                yield (best == i) & (sizes == size), shown, one.trace / SIZES[size]
-
-    return found, split.corrections(noise, groups() if shapes else ())
+def _predict(fit: Solution, observed: Observations) -> _Prediction:
+    """Predict positions by a fit to others."""
+    at = Residuals.at(fit.model, fit.approach, observed, fit.parameters)
+    rows = at.whitening.shape[0] * at.whitening.shape[1]
+    return _Prediction(at.errors[:rows], at.design[:rows])

@@ -1,27 +1,21 @@
 """Where, how warm and when to measure next, to separate two explanations best.
 
-Two explanations of the same residuals predict different things of a new position. If one of them is
-right, the other one is fitted to that position as well, and then misses it by less than they differ
-by, d. Its sum of squares grows by
-
-    dᵀ (I + A Q Aᵀ)⁻¹ d,
-
-with A its rows of unit weight for the new position and Q its cofactors so far. The noncentrality of
-the test of one against the other grows by as much, so the size from which they can be told apart
-(MIB) falls. Either may be the right one, so the mean of both counts.
+Two explanations of the same residuals predict different things of a position. Let one of them be
+right and predict s. Then t s is seen with t = 1, and what positions tell of t, beside all
+parameters of the other explanation, is the noncentrality of the test of one against the other. A
+position is worth what it adds to that. Either may be the right one, so the mean of both counts.
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
-from functools import cached_property
+from dataclasses import replace
 from typing import NamedTuple, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
 
-from accelstudy.design.information import position_rows
+from accelstudy.design.information import Information, position_rows
 from accelstudy.diagnosis.space.frame import SessionFit
 from accelstudy.diagnosis.space.hypotheses import Hypothesis
 from accelstudy.effects import HoldConditions
@@ -67,36 +61,6 @@ class NextPosition(NamedTuple):
     separates: Separation
 
 
-@dataclass(frozen=True)
-class _Fit:
-    """An explanation, fitted to some positions together with the parameters of the model.
-
-    Attributes
-    ----------
-    design : (m, p) array, of conditions of unit weight
-    observed : (m,) array, what they show
-    """
-
-    design: Array
-    observed: Array
-
-    @cached_property
-    def inverse(self) -> Array:
-        """What turns observations into estimates, (p, m)."""
-        return np.asarray(np.linalg.pinv(self.design, rcond=1e-10))
-
-    def growth(self, rows: Array, seen: Array) -> Array:
-        """How much the sum of squares grows, (k,), if candidates (k, c, p) show `seen`, (k, c)."""
-        inverse = self.inverse
-        missed, shown = (seen - rows @ (inverse @ self.observed))[..., None], rows @ inverse
-        noise = np.eye(rows.shape[-2]) + shown @ np.swapaxes(shown, -1, -2)
-        return np.asarray(np.sum(missed * np.linalg.solve(noise, missed), axis=(1, 2)))
-
-    def beside(self, rows: Array, seen: Array) -> _Fit:
-        """Fit to one more position, with rows (c, p)."""
-        return _Fit(np.concatenate([self.design, rows]), np.append(self.observed, seen))
-
-
 def next_positions(
     frame: SessionFit, first: Explanation, second: Explanation
 ) -> list[NextPosition]:
@@ -113,27 +77,34 @@ def next_positions(
     frame : SessionFit, of the base fit
     first, second : explanations by effects
     """
-    both, chosen, before = (first, second), list[NextPosition](), frame.forces[-1]
+    both, chosen, last = (first, second), list[NextPosition](), frame.forces[-1]
     effects = (one.effect for one in (*first, *second))
     needed = {c for e in effects for c in compose(e.spec, (e.spec,)).hold_columns}
     names = [tuple(one.name for one in explanation) for explanation in both]
     only = [tuple(n for n in a if n not in b) for a, b in (names, names[::-1])]
-    fits = [_Fit(_design(frame, one), frame.residuals.errors) for one in both]
-    values, free = [fit.inverse @ fit.observed for fit in fits], np.array([True])
+    designs, free = [_design(frame, one) for one in both], np.array([True])
+    values = [np.linalg.pinv(a, rcond=1e-10) @ frame.residuals.errors for a in designs]
+    # The first column of either is what the other one predicts.
+    before = [np.column_stack([designs[1 - k] @ values[1 - k], designs[k]]) for k in (0, 1)]
     while len(chosen) < COUNT and free.any():
-        forces, hold = _candidates(frame, needed, before)
+        forces, hold = _candidates(frame, needed, last)
         rows = [candidate_rows(frame, forces, hold, one) for one in both]
         seen = [a @ x for a, x in zip(rows, values, strict=True)]
-        gains = (fits[1].growth(rows[1], seen[0]) + fits[0].growth(rows[0], seen[1])) / 2
-        gains = np.where(free, gains, -np.inf)
+        further = [np.concatenate([seen[1 - k][..., None], rows[k]], axis=-1) for k in (0, 1)]
+        gains = np.where(free, sum(map(_separations, before, further)), -np.inf)
         i = first_best(-gains, CRITERION_TOLERANCE * gains.max())
         chosen.append(_position(frame, hold, i, needed, (only[0], only[1])))
-        before = forces[i]
-        free = free & (
-            np.linalg.norm(forces - before, axis=1) > MIN_CHANGE * frame.solution.gravity
-        )
-        fits = [fit.beside(rows[k][i], seen[1 - k][i]) for k, fit in enumerate(fits)]
+        last = forces[i]
+        free = free & (np.linalg.norm(forces - last, axis=1) > MIN_CHANGE * frame.solution.gravity)
+        before = [np.concatenate([before[k], further[k][i]]) for k in (0, 1)]
     return chosen
+
+
+def _separations(before: Array, further: Array) -> Array:
+    """What each of k further positions, (k, c, p), adds to what is known of the first parameter."""
+    known = Information.of(before)
+    variance = known.covariance[0, 0]
+    return 1 / (variance - known.gain(further, np.eye(1))) - 1 / variance
 
 
 def _position(
@@ -175,7 +146,7 @@ def _candidates(frame: SessionFit, needed: set[str], before: Array) -> tuple[Arr
 
 def _design(frame: SessionFit, explanation: Explanation) -> Array:
     """Design of all positions, (m, p), by the parameters of the model and effects."""
-    shown = [-columns for one in explanation for columns in frame.columns([one])]
+    shown = [-frame.rows(one.effect) @ one.directions for one in explanation]
     return np.concatenate([frame.residuals.design, *shown], axis=1)
 
 

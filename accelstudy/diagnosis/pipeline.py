@@ -7,7 +7,7 @@
    for sets of up to three effects, the posterior.
 3. The evidence is judged by rules, of which the first that matches decides (`decide`).
 4. The effect is chosen and fitted again on a part of the positions, and the others confirm it, or
-   do not, or refute it (`confirm`).
+   do not (`gap_of`).
 
 Where the disagreement lives, what it is worth, and where to measure next, a `CampaignDiagnosis`
 computes when it is asked.
@@ -22,8 +22,7 @@ from accelstudy.campaign.calibration.fit import usual_approach
 from accelstudy.campaign.gross_errors.recognition import recognise
 from accelstudy.campaign.session import Campaign
 from accelstudy.diagnosis.decision.functions import learn_function
-from accelstudy.diagnosis.decision.noise import tests_of_noise, worst_of
-from accelstudy.diagnosis.decision.problem import Problem, fit_base, is_exact, pose
+from accelstudy.diagnosis.decision.problem import Problem, fit_base, pose
 from accelstudy.diagnosis.decision.verdict import (
     Finding,
     Reason,
@@ -31,9 +30,9 @@ from accelstudy.diagnosis.decision.verdict import (
     dismiss_weak_evidence,
     explain,
     judge_noise,
-    withdraw_refuted,
 )
-from accelstudy.diagnosis.held_out import Gap, gap_of
+from accelstudy.diagnosis.evidence.noise_tests import tests_of_noise, worst_of
+from accelstudy.diagnosis.held_out import gap_of
 from accelstudy.diagnosis.result import CampaignDiagnosis
 from accelstudy.diagnosis.rules import RULES
 from accelstudy.sensors.sensor import SensorModel
@@ -64,9 +63,10 @@ def diagnose(
     if recognised is not None:
         campaign = recognised.corrected
     # A stream for each, so that none changes what another one draws.
-    null, *others = (np.random.SeedSequence(seed, spawn_key=(key,)) for key in (0, 1, 4))
+    null, split = (np.random.SeedSequence(seed, spawn_key=(key,)) for key in (0, 1))
     problem = pose(fit_base(campaign, model, approach), null)
-    finding, gap = confirm(problem, decide(problem, campaign), others)
+    finding = decide(problem, campaign)
+    gap = gap_of(problem, finding, split)
     return CampaignDiagnosis(problem, campaign, finding, gap, recognised)
 
 
@@ -83,7 +83,7 @@ def decide(problem: Problem, campaign: Campaign) -> Finding:
     * A test of the noise fails: the noise is not as it is said to be, or an effect looks like it.
     * Nothing is missing.
     """
-    if is_exact(problem.base.solution):
+    if problem.exact:
         return Finding("no_effect", problem.frame, Reason.of("exact"))
     nothing = Finding("no_effect", problem.frame)
     if problem.detection.p_value < RULES.level(problem.evidence.level.known):
@@ -97,26 +97,3 @@ def decide(problem: Problem, campaign: Campaign) -> Finding:
         nothing = dismissed
     worst = worst_of(tests_of_noise(problem, campaign, problem.frame))
     return nothing if worst is None else add_certain_effects(problem, judge_noise(problem, worst))
-
-
-def confirm(
-    problem: Problem, finding: Finding, seeds: list[np.random.SeedSequence]
-) -> tuple[Finding, Gap]:
-    """Predict held-out positions; what they refute is withdrawn, and what is left is tried again.
-
-    Parameters
-    ----------
-    problem : Problem
-    finding : Finding
-    seeds : of the split and of the simulated threshold
-
-    Returns
-    -------
-    finding : Finding, without what was refuted: first a learned function, then all effects
-    gap : Gap, how far the disagreement shrinks, and whether that is confirmed
-    """
-    while True:
-        gap = gap_of(problem, finding, seeds)
-        if gap.held_out is None or not gap.held_out.refutes:
-            return finding, gap
-        finding = finding.without_function or withdraw_refuted(problem, finding, gap.held_out)

@@ -21,14 +21,8 @@ from accelstudy.campaign.gross_errors.recognition import Recognition
 from accelstudy.campaign.session import Campaign
 from accelstudy.diagnosis.consequences import TiltErrors, tilt_errors
 from accelstudy.diagnosis.decision.functions import shares_of_places
-from accelstudy.diagnosis.decision.noise import (
-    exceeds_stated,
-    judged_noise,
-    tests_of_noise,
-    worst_of,
-)
 from accelstudy.diagnosis.decision.posterior import Explanation
-from accelstudy.diagnosis.decision.problem import Problem, is_exact
+from accelstudy.diagnosis.decision.problem import Problem
 from accelstudy.diagnosis.decision.refits import with_settings
 from accelstudy.diagnosis.decision.statement import Part
 from accelstudy.diagnosis.decision.verdict import (
@@ -39,7 +33,14 @@ from accelstudy.diagnosis.decision.verdict import (
 )
 from accelstudy.diagnosis.evidence.candidates import UNKNOWN, Cause
 from accelstudy.diagnosis.evidence.detection import Detection
-from accelstudy.diagnosis.evidence.noise_tests import LEVEL, NoiseTest
+from accelstudy.diagnosis.evidence.noise_tests import (
+    LEVEL,
+    NoiseTest,
+    exceeds_stated,
+    judged_noise,
+    tests_of_noise,
+    worst_of,
+)
 from accelstudy.diagnosis.held_out import Gap
 from accelstudy.diagnosis.next_positions import NextPosition, next_positions
 from accelstudy.diagnosis.rules import RULES
@@ -148,12 +149,12 @@ class CampaignDiagnosis:
 
     @property
     def base(self) -> Solution:
-        """Fit of the base model with equal axes."""
+        """Fit of the base model."""
         return self.problem.base.solution
 
     @property
     def frame(self) -> SessionFit:
-        """Session of the base fit, with unequal axes weighted."""
+        """Session of the base fit."""
         return self.problem.frame
 
     @property
@@ -327,13 +328,6 @@ class CampaignDiagnosis:
         return float(np.sqrt(self.noise.variance) * np.mean(self.final.residuals.sigmas[:, :3]))
 
     @property
-    def weights(self) -> list[float]:
-        """Variances of the axes over their mean; empty if they are weighted alike."""
-        variances = self.frame.solution.variances[0, :3]
-        differ = self.frame.solution is not self.base
-        return (variances / variances.mean()).tolist() if differ else []
-
-    @property
     def global_test(self) -> GlobalTest | None:
         """Test of the base model against the a-priori sigma."""
         if not self.sigma_known:
@@ -418,7 +412,7 @@ class CampaignDiagnosis:
     def suspects(self) -> dict[int, float]:
         """Positions that a calibration with the base model marks, and the p-value of each."""
         base = self.base
-        if is_exact(base):
+        if self.problem.exact:
             return {}
         trusted = judged_noise(self.problem, self.frame).trusted
         marked = suspects(base.model, base.approach, base.observed, OUTLIER_LEVEL, trusted)

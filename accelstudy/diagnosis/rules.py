@@ -65,15 +65,12 @@ class Rules:
     """Family-wise level of all tests of the noise but that of its size."""
     level_sigma: float = REFUTATION_LEVEL
     """Level of the test of the size of the noise, and of any fit that is accepted."""
-    level_confirmed: float = 0.05
-    """Probability that something is confirmed on held-out positions though nothing is missing."""
     z_component: float = 3.5
     """Largest value of a learned function, over its sigma, from which on it shows in an axis."""
-    z_significant: float = 1.645
-    """Size from which on a correction of held-out positions, over its sigma, is significant: 5 %,
-    one-sided."""
-    z_refuted: float = 2.576
-    """Shortfall of a correction, over its sigma, that a right model has in 0.5 % of cases."""
+    z_confirmed: float = 3.0
+    """Size from which on a correction of held-out positions, over its sigma, confirms what was
+    found. Where a name was given to noise, after looking at these positions too, about one in 20
+    has that."""
 
     # --- posterior probabilities from which on something is said --------------------------------
 
@@ -107,9 +104,7 @@ class Rules:
     alike: float = 0.9999
     """Canonical cosine above which two signatures are the same."""
     visible: float = 3e-3
-    """Share of its signature that the model must leave, or an effect is invisible."""
-    visible_shape: float = 3e-3
-    """Share of a shape that the model must leave, or the shape is not seen."""
+    """Share of its signature that the model must leave, or an effect or a function is invisible."""
     absorbed: float = 1e-2
     """A direction counts as absorbed by the model if less than this share of it is left."""
     same_attitude: float = 0.05
@@ -131,8 +126,6 @@ class Rules:
     enough: int = 10
     """Simulated values beyond the observed one that are enough to take their share as its
     p-value."""
-    threshold_sets: int = 800
-    """Sets of residuals that are simulated for the threshold of a confirmation."""
     held_out: float = 1 / 3
     """Share of the positions that is held out."""
     held_out_least: int = 3
@@ -159,8 +152,6 @@ class Rules:
     """Log evidence by which a set may be weaker than the strongest one and still be extended."""
     negligible: float = 20.0
     """Log evidence by which a set may be weaker than the strongest one and still be weighed."""
-    set_positions: int = 100
-    """Outlying positions that are tried in sets, at most."""
     bounds_within: float = 8.0
     """Log evidence by which a set may be weaker than the strongest one and still get the bounds of
     each effect beside the others."""

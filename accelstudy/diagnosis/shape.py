@@ -1,4 +1,4 @@
-"""A learned function as people see it: what depends on what, its table, the residuals upon it."""
+"""A learned function as people see it: what depends on what, and its table."""
 
 from __future__ import annotations
 
@@ -13,8 +13,6 @@ from accelstudy.basics.wording import comma_list, number
 from accelstudy.diagnosis.decision.functions import coordinate_values
 from accelstudy.diagnosis.decision.verdict import Finding
 from accelstudy.diagnosis.rules import RULES
-from accelstudy.diagnosis.space.frame import SessionFit
-from accelstudy.diagnosis.space.shapes import function_rows
 from accelstudy.effects import learned
 from accelstudy.effects.learned import OF_EACH, WAVES, Learned
 
@@ -121,9 +119,6 @@ class LearnedShape:
     axes : tuple of str, those in which it shows
     grid : (k,) array, the coordinate, SI
     values, sigmas : (k, c) arrays, h and its sigma there, SI
-    where : (n, c) array, the coordinate of each component in the positions, SI
-    residuals, spreads : (n, c) arrays, h and what the final fit leaves of it in each position, as
-        far as the position shows it, and the noise of that, SI; NaN where it does not act
     """
 
     coordinate: str
@@ -135,9 +130,6 @@ class LearnedShape:
     grid: Array
     values: Array
     sigmas: Array
-    where: Array
-    residuals: Array
-    spreads: Array
 
     @property
     def extents(self) -> dict[str, float]:
@@ -166,13 +158,6 @@ def shape_of(finding: Finding, variance: float) -> LearnedShape | None:
     own = [names.index(parameter.name) for parameter in effect.parameters]
     parameters, cofactors = solution.parameters[own], solution.cofactors[np.ix_(own, own)]
     values, sigmas = effect.function(grid, parameters, variance * cofactors)
-    here = [effect.function(at[:, min(i, at.shape[1] - 1)], parameters, cofactors)[0][:, i]
-            for i in range(values.shape[1])]  # fmt: skip
-    left, spreads = _residual_function(frame, effect, variance)
-    if effect.coordinate == "previous":
-        # It acts where something moved: not in the first position.
-        steps = np.column_stack([frame.hold.column(f"step_{axis}") for axis in "xyz"])
-        spreads[~steps.any(axis=1)] = np.nan
     target, most = TARGETS[effect.target], np.max(np.abs(values) / sigmas, axis=0)
     shown = most >= min(RULES.z_component, most.max())
     axes = tuple(name for name, seen in zip(target.components, shown, strict=True) if seen)
@@ -186,17 +171,4 @@ def shape_of(finding: Finding, variance: float) -> LearnedShape | None:
         grid,
         values,
         sigmas,
-        np.broadcast_to(at, left.shape),
-        np.where(np.isnan(spreads), np.nan, np.stack(here, axis=1) + left),
-        spreads,
     )
-
-
-def _residual_function(frame: SessionFit, effect: Learned, variance: float) -> tuple[Array, Array]:
-    """What each position leaves of h by its residuals, and the noise of that, (n, c) each."""
-    n, conditions = frame.residuals.whitening.shape[:2]
-    rows = function_rows(frame, effect.target, np.ones((n, 1, 1)))
-    seen = rows[: n * conditions].reshape(n, conditions, -1)
-    errors = frame.residuals.errors[: n * conditions].reshape(n, conditions, 1)
-    square = np.maximum(np.sum(seen**2, axis=1), np.finfo(float).tiny)
-    return np.sum(seen * errors, axis=1) / square, np.sqrt(variance / square)

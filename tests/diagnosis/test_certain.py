@@ -4,22 +4,13 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from diagnosis_helpers import explanation
-from usual import GRAVITY, NINE, G
+from usual import NINE, G
 
 import accelstudy as acs
-from accelstudy.adjustment.quality import solve
 from accelstudy.basics.errors import InputError
 from accelstudy.campaign.gross_errors.recognition import recognise
-from accelstudy.diagnosis.decision.posterior import Posterior
-from accelstudy.diagnosis.decision.problem import fit_base, pose
-from accelstudy.diagnosis.decision.refits import refit
-from accelstudy.diagnosis.decision.verdict import Finding, Reason, withdraw_refuted
 from accelstudy.diagnosis.pipeline import diagnose
-from accelstudy.diagnosis.prediction import held_out_gap
 from accelstudy.diagnosis.report.words import verdict_lines
-from accelstudy.diagnosis.space.frame import SessionFit
-from accelstudy.effects import get_effect
 from accelstudy.leveling.angles import specific_force
 
 
@@ -65,45 +56,6 @@ def test_what_an_effect_only_imitates_is_not_certain():
         found = diagnose(replace(campaign, forces=forces), NINE)
         assert [one.name for one in found.found] == ["learned"]
         assert found.place == ("force", "bias")
-
-
-def predicted(campaign):
-    """How a quadratic scale that is fitted to two thirds of a session predicts the others."""
-    first = fit_base(campaign, NINE, GRAVITY).solution
-    n = len(campaign.forces)
-    held = np.arange(0, n, 3)
-    base = solve(first.model, GRAVITY, first.observed.take(np.setdiff1d(np.arange(n), held)))
-    extended = refit(base, SessionFit.of(base).hypotheses([get_effect("quadratic_scale")]))
-    return held_out_gap(base, extended, first.observed.take(held), held, 1.0)
-
-
-def test_the_held_out_positions_refute_an_effect_that_is_not_there():
-    """One that is in all positions falls short of what is expected by no more than by chance."""
-    short, rng = [], np.random.default_rng(26)
-    campaign, up = session(36, rng)
-    effect = np.array([1.2e-3, -1e-3, 8e-4]) * up**2 / G
-    for _ in range(30):
-        forces = campaign.forces + 1e-3 * rng.standard_normal((36, 3))
-        gap = predicted(replace(campaign, forces=forces + effect))
-        short.append(gap.short)
-        assert not gap.refutes
-    assert abs(np.mean(short)) < 4 / np.sqrt(30)
-    assert 0.5 < np.std(short) < 1.5
-    effect[::3] *= -1
-    gap = predicted(replace(campaign, forces=forces + effect))
-    assert gap.refutes
-    problem = pose(fit_base(campaign, NINE, GRAVITY))
-    best = problem.frame.candidates["quadratic_scale"][0]
-    weighed = explanation("quadratic_scale", 0.0, best=[best])
-    finding = Finding(
-        "named", problem.frame, chosen=weighed.causes, posterior=Posterior.of([weighed])
-    )
-    said = withdraw_refuted(problem, finding, gap)
-    assert said.verdict == "unknown"
-    assert said.reason == Reason.of(
-        "refuted", names=["quadratic_scale"], before=gap.before, after=gap.after
-    )
-    assert [one.posterior for one in said.credible_set] == pytest.approx([0.5, 0.5])
 
 
 def with_ramp(campaign, first, last):

@@ -9,8 +9,8 @@ from usual import NINE, G
 
 from accelstudy.adjustment.quality import solve
 from accelstudy.approaches import get_approach
-from accelstudy.diagnosis import prediction
 from accelstudy.diagnosis.decision.verdict import Reason
+from accelstudy.diagnosis.held_out import held_out_gap, split_positions
 from accelstudy.diagnosis.pipeline import diagnose
 from accelstudy.diagnosis.report.words import verdict_lines
 from accelstudy.effects import HoldConditions
@@ -30,12 +30,12 @@ def test_held_out_z_is_standard_normal_if_nothing_is_missing(name, scheme, count
     extended = compose("extended", (*(e.spec for e in NINE.effects), "quadratic_scale"))
     directions = get_scheme(scheme).directions
     ideal = session(NINE, np.zeros(NINE.n_parameters), directions, G)
-    fitted, held = prediction.split_positions(-directions, HoldConditions(), count, rng)
+    fitted, held = split_positions(-directions, HoldConditions(), count, rng)
     for _ in range(200):
         observed = ideal.draw(Noise(), 1, rng)
         part, rest = observed.take(fitted), observed.take(held)
         base, more = (solve(model, approach, part) for model in (NINE, extended))
-        z.append(prediction.held_out_gap(base, more, rest, held, 1.0).z)
+        z.append(held_out_gap(base, more, rest, held, 1.0).z)
     assert abs(np.mean(z)) < 4 / math.sqrt(len(z))
     assert abs(np.std(z) - 1) < 4 / math.sqrt(2 * len(z))
 

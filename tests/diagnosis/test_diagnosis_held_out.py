@@ -1,89 +1,14 @@
-"""Held-out positions: what they need to confirm a name, given that a name was given."""
+"""Held-out positions: what they confirm of a name."""
 
 import numpy as np
 import pytest
-from diagnosis_helpers import design, posed, shuffled, some_holds
-from usual import GRAVITY, NINE, ROBOT, G
+from diagnosis_helpers import design, shuffled, some_holds
+from usual import GRAVITY, NINE
 
 import accelstudy as acs
 from accelstudy.basics.wording import words
-from accelstudy.diagnosis import held_out
-from accelstudy.diagnosis.decision.refits import refit
-from accelstudy.diagnosis.evidence.candidates import weigh_singles
-from accelstudy.diagnosis.evidence.detection import Chance, detect
-from accelstudy.diagnosis.evidence.size import Level
 from accelstudy.diagnosis.pipeline import diagnose
-from accelstudy.diagnosis.prediction import LinearSplit, held_out_gap, split_positions
 from accelstudy.diagnosis.report.words import render
-from accelstudy.diagnosis.rules import RULES
-from accelstudy.simulation.sessions import Noise, session
-
-SETS = 25_000
-
-
-@pytest.fixture(
-    scope="module",
-    params=[Level.of_stated_sigma(), Level.of_nothing_stated()],
-    ids=["given", "not given"],
-)
-def parts(request):
-    """Problems of all positions and of two thirds, and the split, with nothing missing."""
-    ideal = session(NINE, np.zeros(NINE.n_parameters), shuffled("fibonacci-30"), G)
-    observed = ideal.draw(Noise(), 1, np.random.default_rng(5))
-    problem = posed(ROBOT, observed, request.param)
-    frame = problem.frame
-    fitted, held = split_positions(frame.forces, frame.hold, 10, np.random.default_rng(2))
-    part = posed(ROBOT, observed.take(fitted), request.param)
-    return problem, part, LinearSplit(frame, fitted, held)
-
-
-def weighed(problem):
-    """The evidence for each candidate by itself."""
-    return weigh_singles(problem.frame, problem.evidence)
-
-
-def test_a_name_that_noise_made_is_confirmed_in_5_percent(parts):
-    """In plain noise, of which few sets are given a name, instead of by importance sampling."""
-    problem, part, split = parts
-    residuals, field, evidence = problem.residuals, problem.field, problem.evidence
-    chance = Chance(np.random.SeedSequence(1), len(residuals.design))
-    beyond = detect(field, evidence, residuals, chance).threshold(RULES.level_effects)
-    rng = np.random.default_rng(3)
-    needed = held_out.threshold(problem, None, beyond, part, split, rng)
-    assert needed > RULES.z_significant + 0.3
-    rng = np.random.default_rng(4)
-    noise = rng.standard_normal((SETS, len(residuals.design)))
-    z = residuals.project(noise.T).T
-    odds = field.odds(evidence, field.project(z))
-    of_any = np.logaddexp.reduce(odds, axis=1) - np.log(len(field.names))
-    label = held_out.labels(problem.classes)
-    claimed = held_out.claimed_names(odds, field.names, label)
-    sets = np.flatnonzero((claimed >= 0) & (of_any > beyond))
-    found, change = held_out.chosen_names(part, split, noise[sets], label)
-    values = split.statistic(change, noise[sets], evidence.level.known)
-    same, n = found == claimed[sets], len(sets)
-    assert n > 150
-    rate = np.mean(same & (values > needed))
-    # Both the simulation of the bound and that of the rate err.
-    assert rate == pytest.approx(0.05, abs=4 * np.sqrt(0.05 * 0.95 * (1 / n + 1 / 300)))
-    # Without regard to the name, as if it were independent, far more would be confirmed.
-    assert np.mean(same & (values > RULES.z_significant)) > 0.12
-
-
-def test_prediction_to_first_order_is_that_of_refits(parts):
-    """Of an effect that the fitted positions show; what either leaves of the held-out ones."""
-    problem, part, split = parts
-    first, base = problem.base.solution, part.base.solution
-    fit = refit(part.frame.solution, [weighed(part).best["quadratic_scale"]])
-    rest = first.observed.take(split.held)
-    gap = held_out_gap(base, fit, rest, split.held, 1.0)
-    errors = problem.residuals.errors[None]
-    missed = split.base_residuals(errors)[1]
-    (columns,) = problem.frame.columns([weighed(problem).best["quadratic_scale"]])
-    change = split.corrections(errors, [(0, columns, 0.0)])
-    assert np.mean(missed**2) == pytest.approx(gap.before, rel=0.02)
-    assert np.mean((missed - change) ** 2) == pytest.approx(gap.after, rel=0.02)
-
 
 GROUPS = {
     ("thermal_bias", "ABBA", "robot"): {"thermal_bias", "thermal_curve"},

@@ -5,12 +5,12 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from diagnosis_helpers import least, most
-from quality_helpers import SIGMA, draw, one, solutions
+from quality_helpers import SIGMA, draw, solutions
 from scipy import stats
-from usual import BOTH, GRAVITY, NINE, ROBOT, G
+from usual import BOTH, GRAVITY, ROBOT, G
 
-from accelstudy.adjustment.quality import solve
 from accelstudy.diagnosis.evidence.detection import Chance
+from accelstudy.diagnosis.evidence.noise_models import coloured_density, unequal_axes_density
 from accelstudy.diagnosis.evidence.noise_tests import (
     axis_test,
     colour_test,
@@ -19,13 +19,13 @@ from accelstudy.diagnosis.evidence.noise_tests import (
     tail_test,
     within_hold_test,
 )
+from accelstudy.diagnosis.evidence.size import Evidence, Level
 from accelstudy.diagnosis.space.residuals import Residuals
 from accelstudy.simulation.sessions import Noise
 
 RUNS, SIMULATED = 200, 200
 RARE = 1e-4
 """Probability with which a test of p-values fails by chance."""
-SHAPE_TESTS = {"axis": axis_test, "colour": colour_test, "tail": tail_test}
 
 
 def sessions(approach, *effects, seed, scheme="mclaren-24", runs=RUNS, **noise):
@@ -37,11 +37,6 @@ def sessions(approach, *effects, seed, scheme="mclaren-24", runs=RUNS, **noise):
 @pytest.fixture(scope="module")
 def white():
     return {a.name: sessions(a, seed=1)[0] for a in (GRAVITY, ROBOT)}
-
-
-def p_values(test, residuals, seed=2):
-    """p-values, each with simulated residuals of its own, so that they are independent."""
-    return np.array([test(r, chance(r, (seed, i))).p_value for i, r in enumerate(residuals)])
 
 
 def chance(residuals, seed):
@@ -69,19 +64,31 @@ def assert_uniform(p):
 # --- nothing is wrong ----------------------------------------------------------------------------
 
 
-@BOTH
-@pytest.mark.parametrize("name", SHAPE_TESTS)
-def test_p_values_of_white_noise_are_uniform(white, name, approach):
-    assert_uniform(p_values(SHAPE_TESTS[name], white[approach.name]))
+def evidence_of(residuals):
+    """Log evidence for unequal axes and for coloured noise, where sigma is not given."""
+    evidence = Evidence(Level.of_nothing_stated(), residuals.redundancy)
+    nothing = np.logaddexp.reduce(evidence.noise_density(residuals.z @ residuals.z))
+    colour = coloured_density(residuals, evidence)
+    return unequal_axes_density(residuals, evidence, None) - nothing, colour - nothing
 
 
 @BOTH
-def test_shape_tests_do_not_look_at_the_level(white, approach):
-    """All but the level stay the same when all residuals are scaled."""
-    for r in white[approach.name][:3]:
-        larger = replace(r, errors=7 * r.errors)
-        for test in SHAPE_TESTS.values():
-            assert test(larger, chance(r, 3)).p_value == test(r, chance(r, 3)).p_value
+def test_white_noise_seldom_looks_like_another(white, approach):
+    """p-values of the tails are uniform, those of axes and colour are bounds; no level matters."""
+    residuals = white[approach.name]
+    assert_uniform(
+        np.array([tail_test(r, chance(r, (2, i))).p_value for i, r in enumerate(residuals)])
+    )
+    found = np.array([evidence_of(r) for r in residuals])
+    for k, test in enumerate((axis_test, colour_test)):
+        p = np.array([test(r, x).p_value for r, x in zip(residuals, found[:, k], strict=True)])
+        for level in (0.01, 0.05, 0.10):
+            assert np.sum(p <= level) <= most(RUNS, level, RARE)
+    larger = replace(residuals[0], errors=7 * residuals[0].errors)
+    np.testing.assert_allclose(evidence_of(larger), found[0], atol=0.05)
+    assert tail_test(larger, chance(larger, 3)).p_value == (
+        tail_test(residuals[0], chance(residuals[0], 3)).p_value
+    )
 
 
 @BOTH
@@ -149,20 +156,15 @@ def test_holds_that_say_nothing_of_their_noise_accuse_nothing():
 # --- something is wrong --------------------------------------------------------------------------
 
 
-@BOTH
-def test_unequal_axes_do_not_look_like_colour(approach):
-    """Weighted as they are, the axes leave the test what it is; unweighted it errs twice as often
-    at most, while the test of the axes finds them."""
-    kappa = np.array([1.0, 1.0, 4.0])
-    drawn = draw(14, noise=Noise(effects=("axis_noise(kappa_z=4)",)), replicates=120)
-    raw = [Residuals.of(s) for s in solutions(approach, drawn)]
-    assert np.sum(p_values(colour_test, raw) <= 0.05) <= most(len(raw), 0.1, RARE)
-    sigma = np.broadcast_to(SIGMA * np.sqrt(kappa), (24, 3))
-    weighted = [
-        Residuals.of(solve(NINE, approach, replace(one(drawn, i), sigma_force=sigma)))
-        for i in range(80)
-    ]
-    assert_uniform(p_values(colour_test, weighted))
+@pytest.mark.parametrize(
+    ("k", "effect"), [*enumerate(["axis_noise(kappa_z=16)", "coloured_noise(share=0.8, tau=3)"])]
+)
+def test_noise_of_a_kind_is_told_from_the_other(k, effect):
+    """In 50 positions, by a robot without errors."""
+    made = sessions(ROBOT, effect, seed=14, scheme="fibonacci-50", runs=20, sigma_angle=1e-6)
+    found = np.array([evidence_of(r) for r in made[0]])
+    assert np.mean(found[:, k] > found[:, 1 - k]) > 0.8
+    assert np.mean(found[:, k] > np.log(400)) > 0.5
 
 
 @pytest.mark.parametrize("lsb", [0.05, 0.2])

@@ -13,7 +13,12 @@ from accelstudy.campaign.calibration.fit import fit_campaign
 from accelstudy.campaign.calibration.wording import verdict_lines as calibrated_lines
 from accelstudy.diagnosis.decision.problem import SEED, BaseFit, Problem
 from accelstudy.diagnosis.evidence import detection
-from accelstudy.diagnosis.evidence.detection import Chance, detect, tail_probability
+from accelstudy.diagnosis.evidence.detection import (
+    Chance,
+    detect,
+    null_distribution,
+    tail_probability,
+)
 from accelstudy.diagnosis.evidence.size import Level, log_mean
 from accelstudy.diagnosis.held_out import Gap
 from accelstudy.diagnosis.pipeline import decide, diagnose
@@ -50,15 +55,16 @@ def test_noise_alone_counts_as_often_as_the_level_says(designs, approach, level,
     for seed in range(RUNS):
         chance = Chance(np.random.SeedSequence(seed), len(residuals.design))
         errors = rng.standard_normal((SETS, len(residuals.design)))
-        found = detect(field, evidence, replace(residuals, errors=errors[0]), chance)
+        first = replace(residuals, errors=errors[0])
+        found, null = (f(field, evidence, first, chance) for f in (detect, null_distribution))
         z = residuals.project(errors.T).T
         odds = log_mean(field.odds(evidence, field.project(z)))
-        p = np.array([tail_probability(found.by_chance, found.weights, value) for value in odds])
+        p = np.array([tail_probability(*null, value) for value in odds])
         # Densities of many sets at once are rounded: one or two may move past the observed one.
         assert p[0] == pytest.approx(found.p_value, abs=0.005)
         rates.append(np.mean(p < RULES.level(level.known)))
         seen.append(odds)
-        weights.append(np.mean(found.weights))
+        weights.append(np.mean(null[1]))
     error = np.std(rates, ddof=1) / np.sqrt(RUNS)
     # Small enough that a level of one percent more or less would not pass.
     assert STANDARD_ERRORS * error < 0.012

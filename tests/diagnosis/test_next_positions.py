@@ -50,13 +50,13 @@ def fitted(design, seen):
 
 
 def separations(u, old, taken, candidates):
-    """What each candidate adds beside those taken: either explanation is right, or the other."""
+    """What each candidate adds to what one explanation leaves of what the other one predicts."""
     names = ("quadratic_scale", "cubic_scale")
     total = np.zeros(len(candidates))
     for right, wrong in (names, names[::-1]):
         told = fitted(rows(u, right), old)[0]
         before = np.concatenate([u, taken])
-        seen = np.append(old, rows(taken, right) @ told)
+        seen = rows(before, right) @ told
         least = fitted(rows(before, wrong), seen)[1]
         for i, one in enumerate(candidates):
             more = np.append(seen, rows(one[None], right) @ told)

@@ -10,10 +10,19 @@ from scipy import stats
 from usual import GRAVITY, NINE, G
 
 from accelstudy.diagnosis.decision import verdict
-from accelstudy.diagnosis.decision.noise import judged_noise, lack_of_fit, worst_of
 from accelstudy.diagnosis.decision.posterior import Posterior
 from accelstudy.diagnosis.decision.verdict import judge_noise
-from accelstudy.diagnosis.evidence.noise_tests import AXES, COLOUR, LEVEL, STEPS, TAILS, NoiseTest
+from accelstudy.diagnosis.evidence.noise_tests import (
+    AXES,
+    COLOUR,
+    LEVEL,
+    STEPS,
+    TAILS,
+    NoiseTest,
+    judged_noise,
+    lack_of_fit,
+    worst_of,
+)
 from accelstudy.diagnosis.evidence.size import Level
 from accelstudy.simulation.sessions import Noise, session
 

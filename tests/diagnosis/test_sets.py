@@ -1,6 +1,5 @@
 """The evidence for two and three candidates together, beside a basis of all their shapes."""
 
-from dataclasses import replace
 from itertools import combinations, permutations, product
 
 import numpy as np
@@ -8,7 +7,6 @@ import pytest
 from diagnosis_helpers import design, shuffled, some_holds
 from usual import GRAVITY, ROBOT
 
-from accelstudy.diagnosis.evidence import sets
 from accelstudy.diagnosis.evidence.sets import set_prior, weigh_sets
 from accelstudy.diagnosis.evidence.size import Evidence, Level
 from accelstudy.diagnosis.rules import RULES
@@ -93,15 +91,6 @@ def test_pairs_are_close_to_those_over_all_shapes(problem):
     assert {*found} == {*expected}
     for names, log in expected.items():
         assert found[names].log_density == pytest.approx(log, abs=0.8)
-
-
-def test_of_many_positions_those_that_explain_most_are_tried(problem, monkeypatch):
-    shapes, residuals, _ = problem
-    monkeypatch.setattr(sets, "RULES", replace(RULES, set_positions=4))
-    alone = [np.sum((h.basis.T @ residuals.z) ** 2) for h in shapes[OUTLIER]]
-    places = {shapes[OUTLIER][int(i)].place for i in np.argsort(alone)[-4:]}
-    found = weigh_sets(*problem)
-    assert {h.place for one in found for h in one.best if h.name == OUTLIER} <= places
 
 
 def test_one_candidate_makes_no_set(problem):

@@ -12,7 +12,10 @@ from accelstudy.diagnosis.pipeline import diagnose
 from accelstudy.diagnosis.report.document import diagnosis_document
 from accelstudy.diagnosis.report.words import verdict_lines
 
-CANNOT = "slow noise, or an effect of temperature or time that these columns cannot tell"
+CANNOT = (
+    "noise that is slow or differs from hold to hold, or an effect of temperature or time that "
+    "these columns cannot tell"
+)
 
 
 def session(course, seed=1, n=40, size=6.0, robot=True, sigma=0.002, **columns):

@@ -31,8 +31,6 @@ from accelstudy.sensors.models import get_model
 from accelstudy.study.sensitivity import sensitivity_table, shapley_table
 
 SENSITIVITY = {"base_samples": 2, "roll_gon": 10, "pitch_gon": 0}
-OPTIONAL = {"sigma_position_axes_mps2"}
-"""Keys that a file need not have."""
 
 
 def described(page):
@@ -70,7 +68,7 @@ def strict(schema):
         return schema
     content = {key: strict(value) for key, value in schema.items()}
     if "properties" in schema and "type" in schema:
-        content |= {"required": [*{*schema["properties"]} - OPTIONAL]}
+        content |= {"required": [*schema["properties"]]}
         content |= {"additionalProperties": False}
     return content
 

@@ -126,13 +126,6 @@ def test_a_calibration_with_the_noise_that_was_found():
     assert diagnosis.verdict == "noise_model"
     assert content["sigma_source"] == "a posteriori"
     assert content["sigma_position_mps2"] == pytest.approx(diagnosis.sigma_position)
-    _, diagnosis, content = calibration_of(
-        noise_effects=("axis_noise(kappa_x=1, kappa_y=1, kappa_z=4)",)
-    )
-    assert content["sigma_position_mps2"] == pytest.approx(diagnosis.sigma_position)
-    assert np.mean(content["sigma_position_axes_mps2"]) == pytest.approx(diagnosis.sigma_position)
-    assert content["sigma_position_axes_mps2"][2] > 2 * content["sigma_position_axes_mps2"][0]
-    assert "weighted by their noise" in content["warnings"][0]
 
 
 # --- forms for devices ---------------------------------------------------------------------------

@@ -294,8 +294,6 @@ class CalibrationDocument(Document):
     sigma_position_mps2 : noise of a position mean, as quoted
     sigma_position_priori_mps2 : the same, as stated in the header
     sigma_position_posteriori_mps2 : the same, from the residuals
-    sigma_position_axes_mps2 : the same of x, y and z, only where a diagnosis found that they
-        differ
     sigma_reading_mps2 : noise of a single reading, from the samples within the holds
     parameters : in SI
     covariance : covariance matrix of the parameters, as quoted
@@ -332,7 +330,6 @@ class CalibrationDocument(Document):
     sigma_position_mps2: ParameterSigma | None
     sigma_position_priori_mps2: float | None = None
     sigma_position_posteriori_mps2: float | None = None
-    sigma_position_axes_mps2: list[float] | None = None
     sigma_reading_mps2: ParameterSigma | None = None
     parameters: list[Parameter]
     covariance: list[list[Annotated[float, *bounds_of(VARIANCE)] | None]]

@@ -16,12 +16,12 @@ from numpy.typing import NDArray
 from scipy import special
 
 from accelstudy.adjustment.quality import Solution
-from accelstudy.diagnosis.decision.noise import misfit
 from accelstudy.diagnosis.decision.posterior import Posterior
 from accelstudy.diagnosis.decision.problem import Problem
 from accelstudy.diagnosis.decision.refits import refit
 from accelstudy.diagnosis.decision.verdict import Finding, impossible
 from accelstudy.diagnosis.evidence.candidates import UNKNOWN, Cause
+from accelstudy.diagnosis.evidence.noise_tests import misfit
 from accelstudy.diagnosis.evidence.size import Evidence
 from accelstudy.diagnosis.rules import RULES
 from accelstudy.diagnosis.space.frame import SessionFit
@@ -70,7 +70,6 @@ def learn_function(problem: Problem, posterior: Posterior, finding: Finding) -> 
                 frame=SessionFit.of(fitted[1]),
                 chosen=chosen,
                 place=found.place,
-                without_function=finding,
             )
     return None
 
@@ -196,7 +195,7 @@ class PlaceShape(NamedTuple):
     effect : Learned, with the amplitude 1
     vectors, shares : (m, k) and (k,) arrays, eigenvectors and eigenvalues of K
     trace : float, of the covariance of the residuals that the amplitude 1 makes
-    logs : (b, s) array, log density of each of b sets of residuals by `SIZES`
+    logs : (s,) array, log density of the residuals by `SIZES`
     """
 
     effect: Learned
@@ -207,20 +206,21 @@ class PlaceShape(NamedTuple):
 
 
 def weigh_place(
-    place: Place, frame: SessionFit, residuals: Residuals, errors: Array, evidence: Evidence
+    place: Place, frame: SessionFit, residuals: Residuals, evidence: Evidence
 ) -> list[PlaceShape]:
-    """Shapes of a place that show, weighed by errors (b, m) in a space of residuals of a frame."""
-    weighed, squares = [], np.sum(errors**2, axis=1)
+    """Shapes of a place that show in residuals of a frame, weighed by them."""
+    weighed, z = [], residuals.z
     for effect in shapes_of(place, frame):
         rows = frame.rows(effect) * effect.deviations
         left = residuals.project(rows)
         trace = float(np.sum(left**2))
-        if trace > RULES.visible_shape * float(np.sum(rows**2)):
+        if trace > RULES.visible * float(np.sum(rows**2)):
             values, turned = np.linalg.eigh(left.T @ left)
             kept = values > 1e-6 * trace
             vectors = left @ turned[:, kept] / np.sqrt(values[kept])
             shares = values[kept] / trace
-            logs = evidence.densities_by_size((errors @ vectors) ** 2, shares, squares, SIZES)
+            along, square = (z @ vectors)[None] ** 2, np.array([z @ z])
+            logs = evidence.densities_by_size(along, shares, square, SIZES)[0]
             weighed.append(PlaceShape(effect, vectors, shares, trace, logs))
     return weighed
 
@@ -235,11 +235,11 @@ def fit_of_place(
     frame = problem.frame
     residuals = frame.residuals.orthogonal_to(space_of(beside, len(frame.residuals.z)))
     z, evidence = residuals.z, replace(problem.evidence, redundancy=residuals.redundancy)
-    shapes = weigh_place(place, frame, residuals, z[None], evidence)
+    shapes = weigh_place(place, frame, residuals, evidence)
     if not shapes:
         return None
-    best = max(shapes, key=lambda one: float(np.logaddexp.reduce(one.logs[0])))
-    size = SIZES[int(np.argmax(best.logs[0]))]
+    best = max(shapes, key=lambda one: float(np.logaddexp.reduce(one.logs)))
+    size = SIZES[int(np.argmax(best.logs))]
     growth, ratio, base = size * best.shares, 1.0, frame.solution
     if not evidence.level.known:
         taken = np.sum((z @ best.vectors) ** 2 * growth / (1 + growth))

@@ -6,13 +6,11 @@ Each piece of the evidence is weighed when it is asked for, and then kept.
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from contextlib import suppress
 from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy import special
 
 from accelstudy.adjustment.quality import Solution, column_basis, solve
 from accelstudy.approaches import Approach
@@ -31,7 +29,7 @@ from accelstudy.diagnosis.evidence.candidates import (
     weigh_singles,
 )
 from accelstudy.diagnosis.evidence.detection import Chance, Detection, detect
-from accelstudy.diagnosis.evidence.noise_models import UnequalAxes, colour_densities
+from accelstudy.diagnosis.evidence.noise_models import coloured_density, unequal_axes_density
 from accelstudy.diagnosis.evidence.noise_tests import (
     AXES,
     COLOUR,
@@ -41,7 +39,7 @@ from accelstudy.diagnosis.evidence.noise_tests import (
     tail_test,
 )
 from accelstudy.diagnosis.evidence.sets import set_prior, weigh_sets
-from accelstudy.diagnosis.evidence.size import Evidence, Level, log_mean
+from accelstudy.diagnosis.evidence.size import Evidence, Level
 from accelstudy.diagnosis.rules import RULES
 from accelstudy.diagnosis.space.frame import SessionFit
 from accelstudy.diagnosis.space.hypotheses import Spaces, cosines, repeats_of
@@ -62,7 +60,7 @@ MAX_POSITIONS = 1000
 
 @dataclass(frozen=True)
 class BaseFit:
-    """The fit of a model to a campaign, with equal axes, and what is known of its noise.
+    """The fit of a model to a campaign, and what is known of its noise.
 
     Attributes
     ----------
@@ -130,11 +128,6 @@ def fit_base(campaign: Campaign, model: SensorModel, approach: Approach) -> Base
     return BaseFit(solve(fit.model, fit.approach, observed), Level.of_holds(), within)
 
 
-def is_exact(fit: Solution) -> bool:
-    """Whether a campaign is its own model, so that only rounding errors are left."""
-    return float(np.sqrt(np.mean(fit.misclosures**2))) < ROUNDING * fit.gravity
-
-
 # --- all that may be missing --------------------------------------------------------------------
 
 
@@ -144,8 +137,8 @@ class Problem:
 
     Attributes
     ----------
-    base : BaseFit, with equal axes
-    frame : SessionFit, the same with unequal axes weighted
+    base : BaseFit
+    frame : SessionFit, of the same
     seed : SeedSequence, of the simulated noise
     """
 
@@ -157,6 +150,12 @@ class Problem:
     def residuals(self) -> Residuals:
         """Residuals of the fit."""
         return self.frame.residuals
+
+    @property
+    def exact(self) -> bool:
+        """Whether the campaign is its own model, so that only rounding errors are left."""
+        fit = self.base.solution
+        return float(np.sqrt(np.mean(fit.misclosures**2))) < ROUNDING * fit.gravity
 
     @cached_property
     def evidence(self) -> Evidence:
@@ -181,24 +180,9 @@ class Problem:
         return RULES.prior_unknown + (RULES.prior_unrecorded if slow else 0.0)
 
     @cached_property
-    def named_field(self) -> Field:
-        """All candidates that have names."""
-        return Field(self.frame.candidates)
-
-    @cached_property
     def field(self) -> Field:
         """All candidates."""
         return Field(self.frame.candidates, self.unknown)
-
-    def best_odds(self, field: Field) -> float:
-        """Log odds of the most probable single thing that is missing against nothing, or 0."""
-        if not field.candidates:
-            return 0.0
-        prior = np.full(len(field.names), 1 / len(field.candidates))
-        if field.unknown is not None:
-            prior[-1] = self.prior_unknown
-        odds = field.odds(self.evidence, field.project(self.residuals.z)) + np.log(prior)
-        return max(0.0, float(np.max(odds)))
 
     # --- effects ----------------------------------------------------------------------------
 
@@ -285,28 +269,15 @@ class Problem:
         return Chance(self.seed, len(self.base.solution.design))
 
     @cached_property
-    def axes(self) -> UnequalAxes:
-        """Unequal axes of the base fit, and the evidence for them."""
-        residuals = Residuals.of(self.base.solution)
-        evidence = Evidence(self.base.level, residuals.redundancy)
-        return UnequalAxes.of(residuals, evidence, self.base.within)
-
-    @property
-    def unequal_axes(self) -> float:
-        """Log odds that nothing is wrong but the noise of the axes, against nothing."""
-        return float(np.log(RULES.prior_axes) + self.axes.log_evidence)
-
-    @cached_property
     def noises(self) -> list[Explanation]:
         """Explanations by wrong noise alone, one of each kind."""
         by_level = self.detection.noise
         nothing = float(np.logaddexp.reduce(by_level))
-        # Weighted axes need no further evidence that they differ.
-        weighted = self.frame.solution is not self.base.solution
+        axes, colour = self.noise_evidence
         tails = most_evidence(tail_test(self.residuals, self.chance).p_value)
         logs = {
-            COLOUR: np.log(RULES.prior_coloured) + log_mean(self._colours),
-            AXES: by_level[0] if weighted else nothing + self.unequal_axes,
+            COLOUR: nothing + np.log(RULES.prior_coloured) + colour,
+            AXES: nothing + np.log(RULES.prior_axes) + axes,
             TAILS: nothing + np.log(RULES.prior_tails) + tails,
         }
         if len(by_level) > 1:
@@ -315,17 +286,17 @@ class Problem:
             logs[name] = np.logaddexp(logs.get(name, -np.inf), by_level[1])
         return [Explanation((Cause(name, (name,)),), float(log)) for name, log in logs.items()]
 
-    @property
-    def slow(self) -> float:
-        """Probability that the noise lasts for some holds, by the evidence alone."""
-        by_level, weights = self.detection.noise, self.evidence.level.weights
-        fast = max((self._colours[0], *(by_level[1:] - np.log(weights[1:]))))
-        return float(special.expit(log_mean(self._colours[1:]) - fast))
-
     @cached_property
-    def _colours(self) -> Array:
-        """Log densities of the residuals with coloured noise, by its length."""
-        return colour_densities(self.residuals, self.evidence)
+    def noise_evidence(self) -> tuple[float, float]:
+        """Log evidence that the axes differ in noise, and that the noise is coloured."""
+        residuals, evidence = self.residuals, self.evidence
+        nothing = float(np.logaddexp.reduce(evidence.noise_density(residuals.z @ residuals.z)))
+        axes = unequal_axes_density(residuals, evidence, self.base.within)
+        return axes - nothing, coloured_density(residuals, evidence) - nothing
+
+    def at(self, frame: SessionFit) -> Problem:
+        """The problem that the residuals of another fit pose."""
+        return self if frame is self.frame else replace(self, frame=frame)
 
     # --- whether, and what ------------------------------------------------------------------
 
@@ -344,25 +315,5 @@ SEED = np.random.SeedSequence(1)
 
 
 def pose(base: BaseFit, seed: np.random.SeedSequence = SEED) -> Problem:
-    """Return the problem that a fit poses: its residuals, and all that its model may lack.
-
-    The axes are weighted by their noise where unequal axes explain the residuals better than equal
-    ones do, with nothing missing, with any single effect, or with something unknown.
-    """
-    first = base.solution
-    problem = Problem(base, SessionFit.of(first), seed)
-    if is_exact(first):
-        return problem
-    noisier = problem.unequal_axes
-    beats_named = noisier > problem.best_odds(problem.named_field)
-    # Something unknown is asked last, as it takes longest.
-    if beats_named and noisier > problem.best_odds(problem.field):
-        sigma = np.sqrt(problem.axes.ratios)
-        mean = np.mean(np.sqrt(first.variances[:, :3]))
-        shaped = np.broadcast_to(mean * sigma / np.mean(sigma), (len(first.variances), 3))
-        observed = replace(first.observed, sigma_force=shaped)
-        # With other weights a sensor that clips may have no solution.
-        with suppress(InputError):
-            weighted = SessionFit.of(solve(first.model, first.approach, observed))
-            return Problem(base, weighted, seed)
-    return problem
+    """Return the problem that a fit poses: its residuals, and all that its model may lack."""
+    return Problem(base, SessionFit.of(base.solution), seed)

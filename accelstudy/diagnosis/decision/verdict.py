@@ -11,14 +11,20 @@ import numpy as np
 
 from accelstudy.adjustment.quality import Solution, global_test
 from accelstudy.basics.levels import REFUTATION_LEVEL
-from accelstudy.diagnosis.decision.noise import lack_of_fit, misfit
 from accelstudy.diagnosis.decision.posterior import NOT_LISTED, Explanation, Posterior
 from accelstudy.diagnosis.decision.problem import Problem, pose
 from accelstudy.diagnosis.decision.statement import Part, Statement, statement_of
 from accelstudy.diagnosis.evidence.bounds import within_bounds
 from accelstudy.diagnosis.evidence.candidates import UNKNOWN, Cause
-from accelstudy.diagnosis.evidence.noise_tests import COLOUR, LEVEL, NOISES, STEPS, NoiseTest
-from accelstudy.diagnosis.prediction import HeldOutGap
+from accelstudy.diagnosis.evidence.noise_tests import (
+    COLOUR,
+    LEVEL,
+    NOISES,
+    STEPS,
+    NoiseTest,
+    lack_of_fit,
+    misfit,
+)
 from accelstudy.diagnosis.rules import RULES
 from accelstudy.diagnosis.space.frame import SessionFit
 from accelstudy.diagnosis.space.shapes import Place
@@ -58,7 +64,6 @@ class Finding:
     posterior : Posterior, empty where nothing is missing
     statement : Statement, what is missing whatever else is open, and what may be beside that
     place : Place or None, coordinate and target of a learned function, which is the first chosen
-    without_function : Finding or None, what is said without that function
     """
 
     verdict: str
@@ -68,7 +73,6 @@ class Finding:
     posterior: Posterior = field(default=Posterior())
     statement: Statement = field(default=Statement())
     place: Place | None = None
-    without_function: Finding | None = None
 
     @property
     def credible_set(self) -> tuple[Explanation, ...]:
@@ -294,25 +298,6 @@ def _disagreement(problem: Problem, chosen: Sequence[Cause]) -> float:
     return max(fit[1].omega - noise, 1e-9)
 
 
-def withdraw_refuted(problem: Problem, finding: Finding, held: HeldOutGap) -> Finding:
-    """What is said where the held-out positions refute what was chosen: nothing of it is certain.
-
-    Parameters
-    ----------
-    problem : Problem
-    finding : Finding
-    held : HeldOutGap
-    """
-    reason = finding.reason
-    if finding.verdict != "unknown":
-        names = [cause.name for cause in finding.chosen]
-        reason = Reason.of("refuted", names=names, before=held.before, after=held.after)
-    doubted = [name for cause in finding.chosen for name in cause.members]
-    posterior = finding.posterior.doubting(doubted)
-    says = Statement((), statement_of(posterior.all, problem.cosine).open)
-    return Finding("unknown", problem.frame, reason, posterior=posterior, statement=says)
-
-
 # --- a test of the noise fails, though no effect was significant --------------------------------
 
 
@@ -352,20 +337,15 @@ def reason_of_unrecorded(problem: Problem, finding: Finding) -> Reason | None:
     posterior, absent = finding.posterior, problem.frame.absent
     if finding.verdict not in ("noise_model", "unknown") or not absent or not posterior.all:
         return None
-    slow, probability = problem.slow, p_coloured(problem, finding)
+    probability = p_coloured(problem, finding)
     if finding.verdict == "noise_model":
         enough = probability >= posterior.p_noise / 2
     else:
-        enough = slow * probability + _p_courses(problem, posterior) >= RULES.sure
+        enough = probability + _p_courses(problem, posterior) >= RULES.sure
     if not enough:
         return None
-    noise = "slow"
-    if finding.verdict != "unknown" and slow < RULES.sure:
-        noise = "by hold" if slow <= 1 - RULES.sure else "either"
     repeated = problem.attitude is not None
-    return Reason.of(
-        "unrecorded", noise=noise, absent=absent, repeated=repeated, why=finding.reason
-    )
+    return Reason.of("unrecorded", absent=absent, repeated=repeated, why=finding.reason)
 
 
 def _p_courses(problem: Problem, posterior: Posterior) -> float:

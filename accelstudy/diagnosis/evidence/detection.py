@@ -21,7 +21,7 @@ from numpy.typing import NDArray
 from accelstudy.diagnosis.evidence.candidates import Field
 from accelstudy.diagnosis.evidence.size import Evidence, log_mean
 from accelstudy.diagnosis.rules import RULES
-from accelstudy.diagnosis.space.hypotheses import Shapes, log_sum
+from accelstudy.diagnosis.space.hypotheses import Spaces, log_sum
 from accelstudy.diagnosis.space.residuals import Residuals
 
 Array = NDArray[np.float64]
@@ -64,11 +64,11 @@ class Chance:
         noise = np.concatenate([noise, more], axis=1)
         return noise - (noise @ residuals.absorbed) @ residuals.absorbed.T
 
-    def errors_with_effects(self, residuals: Residuals, shapes: Shapes) -> Array:
+    def errors_with_effects(self, residuals: Residuals, spaces: Spaces) -> Array:
         """Draw residuals, (b, m), the second half of them with a random effect."""
         errors = self.errors(residuals)
         half = len(errors) // 2
-        changed = errors[half:] + draw_effects(shapes, len(errors) - half, self.stream(EFFECTS))
+        changed = errors[half:] + draw_effects(spaces, len(errors) - half, self.stream(EFFECTS))
         changed -= (changed @ residuals.absorbed) @ residuals.absorbed.T
         return np.concatenate([errors[:half], changed])
 
@@ -82,43 +82,36 @@ class Detection:
     p_value : float, probability of as much total evidence by noise alone
     densities : dict of candidate to log density of the residuals
     noise : (c,) array, log density of the residuals in noise alone, by the components of the level
-    by_chance, weights : (s,) arrays, S of simulated residuals, and their weights as noise alone
     """
 
     p_value: float
     densities: Mapping[str, float]
     noise: Array
-    by_chance: Array
-    weights: Array
-
-    def threshold(self, level: float) -> float:
-        """Value of S that noise alone exceeds with the probability `level`."""
-        order = np.argsort(-self.by_chance)
-        rate = np.cumsum(self.weights[order]) / len(self.by_chance)
-        place = min(int(np.searchsorted(rate, level)), len(order) - 1)
-        return float(self.by_chance[order[place]])
 
 
 def detect(field: Field, evidence: Evidence, residuals: Residuals, chance: Chance) -> Detection:
     """Test whether anything is missing."""
     if not field.candidates:
         noise = evidence.noise_density(residuals.z @ residuals.z)
-        return Detection(1.0, {}, noise, np.zeros(0), np.zeros(0))
+        return Detection(1.0, {}, noise)
     seen = field.project(residuals.z)
     densities, noise = field.densities(evidence, seen), evidence.noise_density(seen.squares)
     observed = densities - np.logaddexp.reduce(noise)
-    drawn = field.project(chance.errors_with_effects(residuals, field.spaces))
-    each = field.odds(evidence, drawn)
-    ratio = np.exp(np.minimum(log_ratio(field.spaces, drawn.parts), 700.0))
-    weights = 1 / (0.5 + 0.5 * ratio)
-    by_chance = log_mean(each)
+    null = null_distribution(field, evidence, residuals, chance)
     return Detection(
-        p_value=tail_probability(by_chance, weights, float(log_mean(observed))),
+        p_value=tail_probability(*null, float(log_mean(observed))),
         densities=dict(zip(field.names, densities.tolist(), strict=True)),
         noise=noise,
-        by_chance=by_chance,
-        weights=weights,
     )
+
+
+def null_distribution(
+    field: Field, evidence: Evidence, residuals: Residuals, chance: Chance
+) -> tuple[Array, Array]:
+    """S of simulated residuals, (b,), and their weights as noise alone."""
+    drawn = field.project(chance.errors_with_effects(residuals, field.spaces))
+    ratio = np.exp(np.minimum(log_ratio(field.spaces, drawn.parts), 700.0))
+    return log_mean(field.odds(evidence, drawn)), 1 / (0.5 + 0.5 * ratio)
 
 
 def tail_probability(values: Array, weights: Array, value: float) -> float:
@@ -133,25 +126,26 @@ def tail_probability(values: Array, weights: Array, value: float) -> float:
 # --- simulated effects --------------------------------------------------------------------------
 
 
-def draw_effects(shapes: Shapes, count: int, rng: np.random.Generator) -> Array:
-    """Draw what a random shape, of one of the sizes `PROPOSED`, adds to residuals, (count, m)."""
-    places = rng.choice(len(shapes.prior), size=count, p=shapes.prior)
+def draw_effects(spaces: Spaces, count: int, rng: np.random.Generator) -> Array:
+    """Draw what a random space, of one of the sizes `PROPOSED`, adds to residuals, (count, m)."""
+    places = rng.choice(len(spaces.prior), size=count, p=spaces.prior)
     sizes = rng.choice(PROPOSED, size=count)
-    dims = shapes.dims[places]
-    variances = np.repeat(sizes, dims) * np.concatenate([shapes.shares[i] for i in places])
-    return shapes.combine(places, rng.standard_normal(dims.sum()) * np.sqrt(variances))
+    dims = spaces.dims[places]
+    sigmas = np.sqrt(np.repeat(sizes / dims, dims))
+    return spaces.combine(places, rng.standard_normal(dims.sum()) * sigmas)
 
 
-def log_ratio(shapes: Shapes, parts: Array) -> Array:
+def log_ratio(spaces: Spaces, parts: Array) -> Array:
     """Log ratio of the densities of residuals with such an effect and of noise alone, (b,).
 
     Parameters
     ----------
-    shapes : Shapes
-    parts : (b, p) array, of residuals
+    spaces : Spaces
+    parts : (b, s) array, of residuals
     """
     logs = []
     for size in PROPOSED.tolist():
-        taken, growth = shapes.gain_and_growth(parts, size)
-        logs.append(log_sum((taken - growth) / 2 + np.log(shapes.prior)))
+        g = size / spaces.dims
+        taken, growth = parts * (g / (1 + g)), spaces.dims * np.log1p(g)
+        logs.append(log_sum((taken - growth) / 2 + np.log(spaces.prior)))
     return log_mean(np.stack(logs, axis=-1))

@@ -18,10 +18,9 @@ function of the time does.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 from numpy.typing import NDArray
+from scipy.linalg import solve_triangular
 
 from accelstudy.diagnosis.evidence.size import Evidence, log_mean
 from accelstudy.diagnosis.rules import RULES
@@ -35,42 +34,24 @@ LOG_RATIOS = np.linspace(-2.5, 2.5, 9)
 CONTRASTS = np.array([[2.0, -1.0, -1.0], [0.0, 1.0, -1.0]]) / np.sqrt([[6.0], [2.0]])
 
 
-@dataclass(frozen=True)
-class UnequalAxes:
-    """Noise that differs from axis to axis.
+def unequal_axes_density(residuals: Residuals, evidence: Evidence, within: Array | None) -> float:
+    """Log density of residuals with noise that differs from axis to axis, over the ratios.
 
-    Attributes
+    Parameters
     ----------
-    log_evidence : float, for unequal axes against equal ones, with nothing missing
-    ratios : (3,) array, variances of the axes, posterior mean of log κ
+    residuals : Residuals, of a fit with equal axes
+    evidence : Evidence
+    within : (3,) array, variances within the holds; None if unknown
     """
-
-    log_evidence: float
-    ratios: Array
-
-    @classmethod
-    def of(cls, residuals: Residuals, evidence: Evidence, within: Array | None) -> UnequalAxes:
-        """Integrate over the ratios.
-
-        Parameters
-        ----------
-        residuals : Residuals, of a fit with equal axes
-        evidence : Evidence
-        within : (3,) array, variances within the holds; None if unknown
-        """
-        x, y = (values.ravel() for values in np.meshgrid(LOG_RATIOS, LOG_RATIOS))
-        logs = np.column_stack([x, y]) @ CONTRASTS
-        determinant, squares = _restricted(residuals, np.exp(logs))
-        densities = np.logaddexp.reduce(evidence.noise_density(squares, determinant), axis=-1)
-        prior = _normal(x, y, np.zeros(3), RULES.spread_axes)
-        if within is not None and np.all(within > 0):
-            centre = np.log(within) - np.mean(np.log(within))
-            prior = (prior + _normal(x, y, centre, RULES.spread_within)) / 2
-        posterior = prior * np.exp(densities - densities.max())
-        mean = posterior @ logs / posterior.sum()
-        z = residuals.z
-        nothing = float(np.logaddexp.reduce(evidence.noise_density(z @ z)))
-        return cls(float(log_mean(densities, prior)) - nothing, np.exp(mean))
+    x, y = (values.ravel() for values in np.meshgrid(LOG_RATIOS, LOG_RATIOS))
+    ratios = np.exp(np.column_stack([x, y]) @ CONTRASTS)
+    determinant, squares = _restricted(residuals, ratios)
+    densities = np.logaddexp.reduce(evidence.noise_density(squares, determinant), axis=-1)
+    prior = _normal(x, y, np.zeros(3), RULES.spread_axes)
+    if within is not None and np.all(within > 0):
+        centre = np.log(within) - np.mean(np.log(within))
+        prior = (prior + _normal(x, y, centre, RULES.spread_within)) / 2
+    return float(log_mean(densities, prior))
 
 
 def _normal(x: Array, y: Array, centre: Array, spread: float) -> Array:
@@ -109,15 +90,18 @@ def colour_kernels(n: int) -> Array:
     return np.stack([autocorrelation(lag, x) if np.isfinite(x) else walk for x in LENGTHS])
 
 
-def colour_densities(residuals: Residuals, evidence: Evidence) -> Array:
-    """Log densities of residuals with coloured noise, (k,), by length; means over strengths."""
+def coloured_density(residuals: Residuals, evidence: Evidence) -> float:
+    """Log density of residuals with coloured noise, over lengths and strengths."""
     n, c = residuals.whitening.shape[:2]
     f, z, logs = residuals.force_noise, residuals.z, []
     for kernel in colour_kernels(n):
         covariance = np.einsum("ica,ij,jda->icjd", f, kernel, f).reshape(n * c, n * c)
         rows = residuals.project(np.pad(covariance, (0, len(z) - n * c)))
-        shares, vectors = np.linalg.eigh(residuals.project(rows.T))
-        along = ((z @ vectors) ** 2)[None]
-        shares = np.maximum(shares, 0.0)
-        logs.append(evidence.densities_by_size(along, shares, np.array([z @ z]), STRENGTHS)[0])
-    return log_mean(np.array(logs))
+        process = residuals.project(rows.T)
+        for strength in STRENGTHS:
+            root = np.linalg.cholesky(np.eye(len(z)) + strength * process)
+            white = solve_triangular(root, z, lower=True)
+            determinant = 2 * np.sum(np.log(np.diag(root)))
+            density = evidence.noise_density(white @ white, determinant)
+            logs.append(np.logaddexp.reduce(density))
+    return float(log_mean(np.array(logs)))

@@ -1,23 +1,31 @@
 """Tests of the noise: its level, axes, colour, tails and resolution, and the noise within holds.
 
-Those of axes, colour and tails need no sigma. Their statistics are shares of the residuals, and
-simulations of white Gaussian noise, equal on all axes, in the same adjustment show what is usual.
+Those of axes and colour have the log evidence for such noise as their statistic. That of the tails
+needs no sigma: simulations of Gaussian noise in the same adjustment show what is usual.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy import special
 
-from accelstudy.adjustment.quality import global_test
+from accelstudy.adjustment.quality import Solution, global_test, pooled_variance
+from accelstudy.basics.levels import REFUTATION_LEVEL
+from accelstudy.campaign.calibration.fit import JudgedNoise
+from accelstudy.campaign.session import Campaign
 from accelstudy.diagnosis.evidence.detection import Chance
-from accelstudy.diagnosis.evidence.noise_models import colour_kernels
-from accelstudy.diagnosis.space.hypotheses import clusters
+from accelstudy.diagnosis.rules import RULES
+from accelstudy.diagnosis.space.frame import SessionFit
+from accelstudy.diagnosis.space.hypotheses import clusters, space_of_attitudes
 from accelstudy.diagnosis.space.residuals import Residuals
+
+if TYPE_CHECKING:
+    from accelstudy.diagnosis.decision.problem import Problem
 
 Array = NDArray[np.float64]
 
@@ -42,7 +50,7 @@ class NoiseTest:
     name : str, the noise effect that it looks for
     statistic : float
     p_value : float
-    values : tuple of float, what the data say of it: variance factor, variance factors of the
+    values : tuple of float, what the data say of it: variance factor, shares of the
         axes, correlation of successive holds, kurtosis, resolution in m/s²
     remark : str
     by_holds : bool, whether it is measured by the noise within the holds
@@ -56,11 +64,10 @@ class NoiseTest:
     by_holds: bool = False
 
 
-def force_residuals(residuals: Residuals, errors: Array) -> Array:
-    """Residuals of the forces in units of sigma, up to sign, (..., n, 3), of errors (..., m)."""
+def force_residuals(residuals: Residuals) -> Array:
+    """Residuals of the forces in units of sigma, up to sign, (n, 3)."""
     n, c = residuals.whitening.shape[:2]
-    blocks = errors[..., : n * c].reshape(*errors.shape[:-1], n, c)
-    return np.asarray(np.einsum("...nc,nca->...na", blocks, residuals.force_noise))
+    return np.einsum("nc,nca->na", residuals.z[: n * c].reshape(n, c), residuals.force_noise)
 
 
 def level_test(residuals: Residuals, sigma_dof: float = np.inf) -> NoiseTest:
@@ -73,64 +80,25 @@ def level_test(residuals: Residuals, sigma_dof: float = np.inf) -> NoiseTest:
     return NoiseTest(LEVEL, test.statistic, min(test.p_value, 1.0), (factor,), remark)
 
 
-def axis_test(residuals: Residuals, chance: Chance) -> NoiseTest:
-    """Whether one axis is noisier than the others."""
-
-    def shares(errors: Array) -> Array:
-        squares = np.sum(force_residuals(residuals, errors) ** 2, axis=-2)
-        return np.asarray(squares / np.sum(squares, axis=-1, keepdims=True))
-
-    factors = axis_factors(residuals)
-    remark = "variance factors of the axes " + ", ".join(f"{k:.2f}" for k in factors)
-    statistic, p = _largest(residuals, chance, shares, np.abs)
-    return NoiseTest(AXES, statistic, p, tuple(factors), remark)
+def axis_test(residuals: Residuals, evidence: float) -> NoiseTest:
+    """Whether the axes differ in noise, by the log evidence for that beside equal axes."""
+    squares = np.sum(force_residuals(residuals) ** 2, axis=0)
+    shares = tuple((squares / squares.sum()).tolist())
+    remark = "shares of x, y and z in the residuals " + ", ".join(f"{k:.2f}" for k in shares)
+    return NoiseTest(AXES, evidence, _bound(evidence), shares, remark)
 
 
-def axis_factors(residuals: Residuals) -> Array:
-    """Variance factors of the three axes (MINQUE with equal a-priori weights), (3,), at least 0.
-
-    The noise of the axes has the covariance Σ κ_a G_a G_aᵀ in z, G_a = R F_a; the rest, up to I, is
-    that of the robot's angles. With t_ia = U_iᵀ f_ia, of position i, G_aᵀ G_b has the elements
-    δ_ij f_iaᵀ f_ib − t_iaᵀ t_jb, of which only sums of squares are needed.
-    """
-    n, c = residuals.whitening.shape[:2]
-    f = residuals.force_noise
-    t = np.einsum("ncu,nca->nau", residuals.absorbed[: n * c].reshape(n, c, -1), f)
-    shown, taken = np.einsum("nca,ncb->nab", f, f), np.einsum("nau,nbu->nab", t, t)
-    normal = np.einsum("nau,nav->auv", t, t)
-    left = np.sum(shown**2 - 2 * shown * taken, axis=0) + np.einsum("auv,buv->ab", normal, normal)
-    angles = np.einsum("naa->a", shown - taken) - left.sum(axis=1)
-    right = np.sum(force_residuals(residuals, residuals.z) ** 2, axis=0) - angles
-    return np.maximum(np.linalg.lstsq(left, right, rcond=1e-9)[0], 0.0)
-
-
-def colour_test(residuals: Residuals, chance: Chance) -> NoiseTest:
-    """Whether the residuals of holds close in time are alike."""
-    kernels = colour_kernels(len(residuals.whitening))
-
-    def statistics(errors: Array) -> Array:
-        v, total = force_residuals(residuals, errors), np.sum(errors**2, axis=-1)
-        forms = [np.sum(v * (kernel @ v), axis=(-2, -1)) for kernel in kernels]
-        return np.stack(forms, axis=-1) / total[..., None]
-
-    v = force_residuals(residuals, residuals.z)
+def colour_test(residuals: Residuals, evidence: float) -> NoiseTest:
+    """Whether residuals of holds close in time are alike, by the log evidence for that."""
+    v = force_residuals(residuals)
     successive = float(np.sum(v[1:] * v[:-1]) / np.sum(v**2))
     remark = f"residuals of successive holds are correlated by {successive:.2f}".replace("-", "−")
-    statistic, p = _largest(residuals, chance, statistics, np.asarray)
-    return NoiseTest(COLOUR, statistic, p, (successive,), remark)
+    return NoiseTest(COLOUR, evidence, _bound(evidence), (successive,), remark)
 
 
-def _largest(
-    residuals: Residuals,
-    chance: Chance,
-    statistics: Callable[[Array], Array],
-    sided: Callable[[Array], Array],
-) -> tuple[float, float]:
-    """Largest of some statistics, each over its usual scatter about its mean, and its p-value."""
-    usual, seen = statistics(chance.errors(residuals)), statistics(residuals.z)
-    mean, scale = usual.mean(axis=0), usual.std(axis=0)
-    value = float(np.max(sided(seen - mean) / scale))
-    return value, _upper(np.max(sided(usual - mean) / scale, axis=-1), value)
+def _bound(evidence: float) -> float:
+    """Bound of a p-value: white noise gives as much log evidence with a probability of 1/e^x."""
+    return float(np.exp(-max(evidence, 0.0)))
 
 
 def tail_test(residuals: Residuals, chance: Chance) -> NoiseTest:
@@ -143,7 +111,8 @@ def tail_test(residuals: Residuals, chance: Chance) -> NoiseTest:
         return np.asarray(np.mean(squares**2, axis=-1) / np.mean(squares, axis=-1) ** 2)
 
     value = float(kurtosis(residuals.z))
-    p = _upper(kurtosis(chance.errors(residuals)), value)
+    usual = kurtosis(chance.errors(residuals))
+    p = float((1 + np.count_nonzero(usual >= value)) / (1 + len(usual)))
     return NoiseTest(TAILS, value, p, (value,), f"kurtosis of the residuals {value:.1f}")
 
 
@@ -176,11 +145,6 @@ def within_hold_test(
         f"{1e3 * np.sqrt(scatter):.2f} mm/s² of a position mean"
     )
     return NoiseTest(COLOUR, ratio, p, (sigma,), remark, by_holds=True)
-
-
-def _upper(usual: Array, value: float) -> float:
-    """Share of simulated values that are as large."""
-    return float((1 + np.count_nonzero(usual >= value)) / (1 + len(usual)))
 
 
 def most_evidence(p: float) -> float:
@@ -236,10 +200,8 @@ def _rayleigh_of_grid(values: Array, frequencies: Array) -> Array:
     """Rayleigh power at equally spaced frequencies: phases of a coarse grid times a fine one's."""
     width = int(np.ceil(np.sqrt(len(frequencies))))
     fine = frequencies[:width] - frequencies[0]
-    total = np.zeros((len(frequencies[::width]), width), dtype=complex)
-    for part in np.array_split(values, len(values) // 4096 + 1):
-        coarse = np.exp(2j * np.pi * np.outer(frequencies[::width], part))
-        total += coarse @ np.exp(2j * np.pi * np.outer(part, fine))
+    coarse = np.exp(2j * np.pi * np.outer(frequencies[::width], values))
+    total = coarse @ np.exp(2j * np.pi * np.outer(values, fine))
     return np.asarray(np.abs(total.ravel()[: len(frequencies)] / len(values)) ** 2)
 
 
@@ -253,3 +215,127 @@ def _step(values: Array, around: Array) -> float:
     divisors = np.arange(1, 31)
     power = _rayleigh(values, peak / divisors)
     return float(divisors[power > 0.99 * power[0]].max() / peak)
+
+
+# --- what they mean together ---------------------------------------------------------------------
+
+SPECIFIC = (STEPS, COLOUR, AXES, TAILS, LEVEL)
+"""What may be wrong with the noise, the most specific first."""
+
+
+class Misfit(NamedTuple):
+    """Ratio of the residuals of a fit to the noise."""
+
+    ratio: float
+    of_repeats: bool
+    """Whether the noise is what repeated positions differ by, and not what is stated."""
+
+
+def misfit(problem: Problem, solution: Solution) -> Misfit | None:
+    """Return by how much the residuals are larger than the noise; None if they are not.
+
+    The noise is the given sigma. Where none is given, or where repeated positions refute it even
+    after the refit, it is the difference of repeated positions.
+    """
+    stated = problem.evidence.level.known
+    if (
+        stated
+        and 2 * float(special.chdtrc(solution.redundancy, solution.omega)) >= REFUTATION_LEVEL
+    ):
+        return None
+    ratio = float(np.sqrt(solution.omega / solution.redundancy))
+    than_stated = Misfit(ratio, of_repeats=False) if stated else None
+    left = Residuals.of(solution)
+    labels = clusters(problem.frame.forces)
+    if len(labels) != len(solution.misclosures) or len(np.unique(labels)) == len(labels):
+        return than_stated
+    square, freedom = _square_of_repeats(left, space_of_attitudes(left, labels))
+    if not freedom or (stated and special.chdtrc(freedom, square) >= REFUTATION_LEVEL / 2):
+        return than_stated
+    if _lack_of_fit(left, square, freedom) >= REFUTATION_LEVEL:
+        return None
+    return than_stated or Misfit(ratio / float(np.sqrt(square / freedom)), of_repeats=True)
+
+
+def lack_of_fit(problem: Problem) -> float:
+    """p-value of the test whether repeats agree better with each other than with the model."""
+    residuals, same = problem.residuals, problem.attitude
+    if same is None:
+        return 1.0
+    return _lack_of_fit(residuals, *_square_of_repeats(residuals, same.vectors))
+
+
+def _lack_of_fit(residuals: Residuals, square: float, freedom: int) -> float:
+    """F test of all but the differences of repeats against these differences."""
+    rest = residuals.redundancy - freedom
+    if not freedom or not rest:
+        return 1.0
+    ratio = (float(residuals.z @ residuals.z) - square) / rest / (square / freedom)
+    return float(special.fdtrc(rest, freedom, ratio))
+
+
+def _square_of_repeats(residuals: Residuals, same: Array) -> tuple[float, int]:
+    """Square of the differences of repeated positions, and its degrees of freedom.
+
+    Parameters
+    ----------
+    residuals : Residuals
+    same : (m, l) array, orthonormal basis of what they have in common
+    """
+    z = residuals.z
+    square = float(z @ z - np.sum((z @ same) ** 2))
+    return max(square, 0.0), residuals.redundancy - same.shape[1]
+
+
+def tests_of_noise(
+    problem: Problem, campaign: Campaign, frame: SessionFit
+) -> tuple[NoiseTest, ...]:
+    """All tests of the noise that a campaign allows, on the residuals of the base or final fit."""
+    if problem.exact:
+        return ()
+    residuals, base, chance = frame.residuals, problem.residuals, problem.chance
+    sigma, sigma_base = (float(np.mean(one.sigmas[:, :3])) for one in (residuals, base))
+    # With a sigma far too large, the attitudes would look like steps.
+    least = sigma_base * min(1.0, float(np.sqrt(base.variance)))
+    stated = problem.evidence.level.known
+    tests = [level_test(residuals, frame.solution.sigma_dof)] if stated else []
+    axes, colour = problem.at(frame).noise_evidence
+    tests += [
+        axis_test(residuals, axes),
+        colour_test(residuals, colour),
+        tail_test(residuals, chance),
+        resolution_test(campaign.forces, least),
+    ]
+    if campaign.sd is not None and campaign.n_samples is not None:
+        tests.append(within_hold_test(residuals, sigma, campaign.sd, campaign.n_samples))
+    return tuple(tests)
+
+
+def judged_noise(problem: Problem, frame: SessionFit) -> JudgedNoise:
+    """Judge the noise by the residuals of a fit, which give it where no stated sigma holds."""
+    residuals = frame.residuals
+    stated, r = problem.evidence.level.known, residuals.redundancy
+    if not stated or level_test(residuals, frame.solution.sigma_dof).p_value < REFUTATION_LEVEL:
+        return JudgedNoise(trusted=False, variance=residuals.variance)
+    omega = r * residuals.variance
+    return JudgedNoise(True, pooled_variance(omega, r, frame.solution.sigma_dof))
+
+
+def exceeds_stated(problem: Problem, frame: SessionFit) -> bool:
+    """Whether sigma is given, and the residuals of a fit are larger than it allows."""
+    refuted = problem.evidence.level.known and not judged_noise(problem, frame).trusted
+    return refuted and frame.residuals.variance > 1
+
+
+def worst_of(tests: Sequence[NoiseTest]) -> NoiseTest | None:
+    """Return what is wrong with the noise, the most specific finding first."""
+    level = next((t for t in tests if t.name == LEVEL), None)
+    counted = [
+        t
+        for t in tests
+        # A sigma that the residuals confirm knows of what varies from hold to hold.
+        if not (t.by_holds and level is not None and level.p_value >= REFUTATION_LEVEL)
+    ]
+    others = RULES.level_noise / max(len(counted) - (level is not None), 1)
+    failed = [t for t in counted if t.p_value < (REFUTATION_LEVEL if t is level else others)]
+    return min(failed, key=lambda t: SPECIFIC.index(t.name), default=None)

@@ -19,7 +19,7 @@ Stat. Soc. B 82, 1273), costs far less and finds less where signatures are corre
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
@@ -36,9 +36,6 @@ from accelstudy.diagnosis.space.residuals import Residuals
 Array = NDArray[np.float64]
 Places = tuple[int, ...]
 """Numbers of candidates, ascending; that of the outlying positions may be there twice."""
-
-ROWS = 4096
-"""Conditions in one block of work."""
 
 
 @dataclass(frozen=True)
@@ -65,9 +62,6 @@ def weigh_sets(
     most: int = RULES.set_members,
 ) -> list[EffectSet]:
     """Evidence for the sets of two and more candidates that explain residuals best.
-
-    Of the positions that may be outliers only the `set_positions` of the rules are tried that
-    explain most by themselves; sets with the others count as if they explained nothing.
 
     Parameters
     ----------
@@ -112,15 +106,10 @@ class _Search:
         self.shapes: list[Hypothesis] = []
         self.factors: list[float] = []
         priors: list[Array] = []
-        for name, shapes in candidates.items():
-            places = np.arange(len(shapes))
-            if name == OUTLIER and len(places) > RULES.set_positions:
-                order = np.argsort(-shapes.parts(self.z), kind="stable")
-                places = np.sort(order[: RULES.set_positions])
-            tried = [shapes[int(place)] for place in places]
-            self.shapes += tried
-            self.factors += [within_bounds(one, self.z, evidence) for one in tried]
-            priors.append(np.log(shapes.prior[places]))
+        for shapes in candidates.values():
+            self.shapes += shapes.hypotheses
+            self.factors += [within_bounds(one, self.z, evidence) for one in shapes.hypotheses]
+            priors.append(np.log(shapes.prior))
         self.shape_priors = np.concatenate(priors) + self.factors
         self.counts = [len(each) for each in priors]
         self.owners = np.repeat(np.arange(len(self.counts)), self.counts)
@@ -133,7 +122,8 @@ class _Search:
             (some := np.flatnonzero(self.dims == dim), self.starts[some][:, None] + np.arange(dim))
             for dim in np.unique(self.dims)
         ]
-        self.gram, self.seen = _products(self.shapes, self.z)
+        bases = np.concatenate([shape.basis for shape in self.shapes], axis=1)
+        self.gram, self.seen = bases.T @ bases, self.z @ bases
         nothing = float(np.logaddexp.reduce(evidence.noise_density(self.square)))
         self.found: dict[Places, tuple[float, tuple[int, ...]]] = {(): (nothing, ())}
         self.weights: dict[Places, float] = {}
@@ -210,15 +200,3 @@ class _Search:
         logs = self.evidence.spaces_density(parts, dims, self.square)
         alone = float(logs[-1]) if chosen else self.found[()][0]
         return alone, np.where(possible, logs[:-1], -np.inf)
-
-
-def _products(shapes: Sequence[Hypothesis], z: Array) -> tuple[Array, Array]:
-    """Products of the columns of the bases of all shapes with each other, and with residuals."""
-    size = sum(shape.dim for shape in shapes)
-    gram, seen = np.zeros((size, size)), np.zeros(size)
-    # In blocks of conditions: all bases together would need twice the memory.
-    for rows in np.array_split(np.arange(len(z)), len(z) // ROWS + 1):
-        part = np.concatenate([shape.basis[rows[0] : rows[-1] + 1] for shape in shapes], axis=1)
-        gram += part.T @ part
-        seen += z[rows] @ part
-    return gram, seen

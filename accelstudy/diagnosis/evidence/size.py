@@ -161,23 +161,11 @@ class Evidence:
         -------
         (b, s) array
         """
-        # Many sets are simulated ones. They have small effects, and seven digits will do.
-        many = len(total) > 1
-        kind, count = (np.float32, SIMULATED_SIZES) if many else (np.float64, len(SHAPE_SIZES))
-        sizes, ends = SHAPE_SIZES[:count, None], np.cumsum([len(share) for share in shares])
-        g = sizes * np.concatenate(shares)
-        kept, growth = (g / (1 + g)).astype(kind), np.add.reduceat(np.log1p(g), [0, *ends[:-1]], 1)
-        prior = (np.log(SHAPE_WEIGHTS[:count])[:, None] - growth / 2).astype(kind)[..., None]
-        taken = np.empty((len(sizes), len(shares), len(total)), dtype=kind)
-        for i, (along, some) in enumerate(zip(squares, np.split(kept, ends[:-1], 1), strict=True)):
-            taken[:, i] = some @ along.T.astype(kind)
-        noise, logs = self.noise_density(total), []
-        for level, nu in enumerate(self.level.freedoms):
-            left = 1 - taken / (nu + total).astype(kind)
-            each = prior - kind((nu + self.redundancy) / 2) * np.log(left)
-            top = each.max(axis=0)
-            logs.append(top + np.log(np.sum(np.exp(each - top), axis=0)) + noise[:, level])
-        return np.asarray(np.logaddexp.reduce(logs, axis=0).T)
+        count = SIMULATED_SIZES if len(total) > 1 else len(SHAPE_SIZES)
+        each = zip(squares, shares, strict=True)
+        logs = [self.densities_by_size(*one, total, SHAPE_SIZES[:count]) for one in each]
+        weighted = np.stack(logs, axis=1) + np.log(SHAPE_WEIGHTS[:count])
+        return np.asarray(np.logaddexp.reduce(weighted, axis=-1))
 
     def densities_by_size(self, along: Array, share: Array, total: Array, sizes: Array) -> Array:
         """Something with a covariance λ K beside the noise, by its size λ, over all levels.

@@ -136,7 +136,6 @@ def _gap(d: CampaignDiagnosis) -> dict[str, Any]:
         "sigma0_squared": {"before": gap.before, "after": gap.after},
         "held_out_mse": _some(held, "before", "after", "floor"),
         "held_out_z": held and held.z,
-        "held_out_z_needed": held and held.needed,
         "held_out_positions": d.campaign.positions[list(held.held) if held else []].tolist(),
         "leveling_rms_mgon": dict.fromkeys(TiltErrors._fields)
         if tilt is None
@@ -188,18 +187,14 @@ def diagnosed_calibration(diagnosis: CampaignDiagnosis) -> dict[str, Any]:
     """
     fit = diagnosed_fit(diagnosis)
     content = calibration_document(Assessment(fit))
-    weights, recognised = np.asarray(fit.observed.sigma_force), diagnosis.recognised
-    axes = (np.sqrt(fit.variance_factor) * weights[0]).tolist() if weights.ndim else []
-    if axes:
-        content["sigma_position_axes_mps2"] = axes
-    if recognised is not None:
+    if (recognised := diagnosis.recognised) is not None:
         matrix = recognised.matrix
         content["mended"] = {
             "error": recognised.name,
             "reason": recognised.reason,
             "matrix": None if matrix is None else matrix.tolist(),
         }
-    return {**content, "warnings": [*fit.campaign.warnings, *warnings(diagnosis, axes)]}
+    return {**content, "warnings": [*fit.campaign.warnings, *warnings(diagnosis)]}
 
 
 def positions_table(diagnosis: CampaignDiagnosis) -> pd.DataFrame:

@@ -182,34 +182,27 @@ def draw_explanations(ax: Axes, explanations: tuple[Explanation, ...]) -> None:
 
 
 COMPONENTS = {
-    **AXES,
-    **{name: (colour, "o") for name, colour in ANGLE_COLOURS.items()},
-    **{"a": ("#332288", "o"), "b": ("#CC79A7", "s")},
+    **{name: colour for name, (colour, _) in AXES.items()},
+    **ANGLE_COLOURS,
+    **{"a": "#332288", "b": "#CC79A7"},
 }
-"""Colour and marker of what depends on the coordinate of a learned function."""
+"""Colour of what depends on the coordinate of a learned function."""
 BAND = 1.96
 """Half of a band of 95 %, in sigmas."""
-MAX_NOISE_RATIO = 3
-"""Residuals whose noise is more than so many times that of the best are left out."""
 
 
 def shape_figure(shape: LearnedShape) -> Figure:
-    """Draw a learned function with its band over its coordinate, and the residuals upon it."""
+    """Draw a learned function with its band over its coordinate."""
     figure = new_figure(COLUMN, 10 + 36 * len(shape.components))
     panels = figure.subplots(len(shape.components), 1, sharex=True, sharey=True)
     of, target = coordinate_of(shape.effect.coordinate), TARGETS[shape.effect.target]
-    unit = shown_unit(target.unit)
+    unit, grid = shown_unit(target.unit), shape.grid / of.size
     for i, (name, ax) in enumerate(zip(shape.components, panels, strict=True)):
-        colour, marker = COMPONENTS[name]
-        x, at = shape.where[:, i] / of.size, shape.grid
-        within = (at >= shape.where[:, i].min()) & (at <= shape.where[:, i].max())
-        h, sigma = (to_display(v[within, i], target.unit) for v in (shape.values, shape.sigmas))
-        points, grid = to_display(shape.residuals[:, i], target.unit), at[within] / of.size
-        clear = shape.spreads[:, i] <= MAX_NOISE_RATIO * np.nanmin(shape.spreads[:, i])
+        colour = COMPONENTS[name]
+        h, sigma = (to_display(v[:, i], target.unit) for v in (shape.values, shape.sigmas))
         ax.axhline(0, color=INK, linewidth=0.6)
         ax.fill_between(grid, h - BAND * sigma, h + BAND * sigma, color=colour, alpha=0.25, lw=0)
         ax.plot(grid, h, color=colour)
-        ax.plot(x[clear], points[clear], marker, color=colour, markersize=3.2)
         ax.set_ylabel(f"{target.label.format(name)}\n{_per_unit('h', unit)}")
         ax.yaxis.set_major_locator(MaxNLocator(5, steps=[1, 2, 5, 10]))
         if name not in shape.axes:

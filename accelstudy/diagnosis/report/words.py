@@ -63,9 +63,9 @@ def verdict_lines(diagnosis: CampaignDiagnosis) -> list[str]:
     return render("verdict", diagnosis)
 
 
-def warnings(diagnosis: CampaignDiagnosis, axes: Sequence[float]) -> list[str]:
-    """Say what a user of the calibration has to know; `axes` are their sigmas where they differ."""
-    return render("warnings", diagnosis, axes)
+def warnings(diagnosis: CampaignDiagnosis) -> list[str]:
+    """Say what a user of the calibration has to know."""
+    return render("warnings", diagnosis)
 
 
 def clauses(of: Reason) -> list[str]:

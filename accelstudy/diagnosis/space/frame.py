@@ -123,12 +123,6 @@ class SessionFit:
         slope = model.slope_of_last(self.sensed, p, self.hold)
         return replace(shown, force=slope @ shown.force)
 
-    def columns(self, hypotheses: Sequence[Hypothesis]) -> list[Array]:
-        """What shapes of one effect show in the conditions of unit weight, (m, l) each."""
-        effects = [one.effect for one in hypotheses]
-        shown = np.split(self.residuals.whiten(self.signatures(effects)), len(effects), axis=1)
-        return [each @ one.directions for each, one in zip(shown, hypotheses, strict=True)]
-
     def hypotheses(self, shapes: Sequence[Effect]) -> list[Hypothesis | None]:
         """Return what shapes of an effect would leave in the residuals; None for nothing."""
         if not shapes:

@@ -136,25 +136,9 @@ class Shapes:
         logs = evidence.shapes_density(along, self.shares, np.atleast_1d(squares))
         return logs.reshape(*np.shape(squares), -1)
 
-    def gain_and_growth(self, parts: Array, size: float) -> tuple[Array, Array]:
-        """What λ K takes of ‖z‖², (..., s), and log|I + λ K|, (s,), of a size λ."""
-        growth = [size * share for share in self.shares]
-        along = zip(self.split(parts), growth, strict=True)
-        taken = np.stack([each @ (g / (1 + g)) for each, g in along], axis=-1)
-        return taken, np.array([np.sum(np.log1p(g)) for g in growth])
-
     def log_density(self, evidence: Evidence, parts: Array, squares: ArrayLike) -> Array:
         """Log density of residuals over all shapes, (...)."""
         return log_sum(self.logs(evidence, parts, squares) + np.log(self.prior))
-
-    def combine(self, places: NDArray[np.int_], amounts: Array) -> Array:
-        """Sum vectors of some shapes, (b, m), with weights (Σ l,), one shape after the other."""
-        dims = self.dims[places]
-        rows = np.repeat(np.arange(len(places)), dims)
-        first = np.repeat(self.ends[places] - (np.cumsum(dims) - dims), dims)
-        columns = np.zeros((len(places), self.vectors.shape[1]))
-        columns[rows, first + np.arange(len(rows))] = amounts
-        return np.asarray(columns @ self.vectors.T)
 
 
 class Spaces(Shapes):
@@ -172,6 +156,15 @@ class Spaces(Shapes):
         """What λ K takes of ‖z‖², (..., s), and log|I + λ K|, (s,)."""
         g = size / self.dims
         return parts * (g / (1 + g)), np.asarray(self.dims * np.log1p(g), dtype=float)
+
+    def combine(self, places: NDArray[np.int_], amounts: Array) -> Array:
+        """Sum vectors of some shapes, (b, m), with weights (Σ l,), one shape after the other."""
+        dims = self.dims[places]
+        rows = np.repeat(np.arange(len(places)), dims)
+        first = np.repeat(self.ends[places] - (np.cumsum(dims) - dims), dims)
+        columns = np.zeros((len(places), self.vectors.shape[1]))
+        columns[rows, first + np.arange(len(rows))] = amounts
+        return np.asarray(columns @ self.vectors.T)
 
 
 def even(dim: int) -> Array:

@@ -11,7 +11,7 @@ Because S falls with the frequency, a shape does not pay for all of its dimensio
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Collection, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, TypeAlias
 
@@ -86,7 +86,7 @@ class LearnedShapes(Shapes):
         for kind, (place, rows, priors) in enumerate(_functions(frame)):
             projected = frame.residuals.project(rows)
             left, whole = np.sum(projected**2, axis=0), np.sum(rows**2, axis=0)
-            for prior in priors[priors @ left > RULES.visible_shape * (priors @ whole)]:
+            for prior in priors[priors @ left > RULES.visible * (priors @ whole)]:
                 used = prior > MIN_TRACE_SHARE * prior.max()
                 places.append(place)
                 kinds.append(kind)
@@ -132,20 +132,9 @@ class LearnedShapes(Shapes):
         """What is left of the shapes beside a space with an orthonormal basis (m, l)."""
         left = self.vectors - basis @ (basis.T @ self.vectors)
         roots = self.split(left * np.sqrt(np.concatenate([np.zeros(0), *self.shares])))
-        seen = [i for i, root in enumerate(roots) if np.sum(root**2) > RULES.visible_shape]
+        seen = [i for i, root in enumerate(roots) if np.sum(root**2) > RULES.visible]
         places, weights = [self.places[i] for i in seen], self.prior[seen]
         return self._of(places, weights / weights.sum(), [roots[i] for i in seen], len(basis))
-
-    def at(self, places: Collection[Place]) -> LearnedShapes:
-        """Shapes of some places, whose weights sum to 1."""
-        some = [i for i in range(len(self.shares)) if self.places[i] in places]
-        vectors, weights = self.split(self.vectors), self.prior[some]
-        return LearnedShapes(
-            weights / weights.sum(),
-            tuple(self.shares[i] for i in some),
-            np.concatenate([self.vectors[:, :0], *(vectors[i] for i in some)], axis=1),
-            tuple(self.places[i] for i in some),
-        )
 
     def parts(self, errors: Array) -> Array:
         """Squares of residuals (..., m) along the vectors, and in the space of the attitude."""
