@@ -156,12 +156,12 @@ def blocks():
 def y_axis(d):
     """What the y axis of the Innalabs leaves."""
     y, residuals = d.campaign.forces[:, 1] / d.campaign.gravity, 1e3 * d.base.misclosures[:, 0]
-    carried, variances = np.abs(y) > 0.8, d.frame.solution.variances[0, :3]
-    of_axes, down = map(number, variances / variances.mean()), residuals[y < -0.95]
+    carried, down = np.abs(y) > 0.8, residuals[y < -0.95]
+    shares = next(test.values for test in d.noise_tests if test.name == "axis_noise")
     rms = [number(float(np.sqrt(np.mean(residuals[r] ** 2)))) for r in (carried, ~carried)]
     return {
         "positions in which y carries more": str(np.count_nonzero(carried)),
         "rms in these": rms[0], "rms in the others": rms[1],
-        **{f"variance of {axis}": each for axis, each in zip("xyz", of_axes, strict=True)},
+        **{f"share of {axis}": number(each) for axis, each in zip("xyz", shares, strict=True)},
         "least at y down": number(down.min()), "largest at y down": number(down.max()),
     }  # fmt: skip
