@@ -149,6 +149,7 @@ def _summary(statistics: CellStatistics) -> dict[str, Any]:
         statistics[name].scaled(factors)
         for name in ("bias", "sd", "sigma_priori", "sigma_posteriori")
     )
+    linear = cell.linear_theory if theory.estimable else None
     half = sigmas_95(n - 1) * bias.error if n > 1 else np.nan
     ratio = statistics["sd_ratio"]
     spread = np.exp(Z95 * ratio.error / ratio.value)
@@ -164,7 +165,7 @@ def _summary(statistics: CellStatistics) -> dict[str, Any]:
         **_columns("sd_priori_mean", priori, "sd_priori"),
         "bias_ci95_low": bias.value - half,
         "bias_ci95_high": bias.value + half,
-        "sd_linear": theory.sigma * factors,
+        "sd_linear": np.nan * factors if linear is None else linear.sigma * factors,
         "first_error": first_error * factors,
         "first_sd_posteriori": first_sigma * factors,
         "sd_ratio": ratio.value,
