@@ -47,14 +47,16 @@ print(surer.verdict)
 # %% [markdown]
 # ## A plan, checked
 #
-# A plan can be checked by simulating what it recommends. The share of the calibrations that stay
-# below the accuracy must be about what was asked for.
+# `save` writes the positions of the recommended calibration into `positions.yaml`, a scheme. What
+# it leaves can be simulated once more: the share of the calibrations that stay below the accuracy
+# must be about what was asked for.
 
 # %%
+surer.save("plan")
 best = surer.table.iloc[0]
 check = acs.simulate(
     best["model"],
-    best["scheme"],
+    "plan/positions.yaml",
     best["equipment"],
     sigma=best["sensor_sigma_mps2"],
     replicates=2000,

@@ -55,7 +55,7 @@ def test_each_checklist_has_one_new_file(kind, name, room):
 def test_effects_are_in_the_catalogue_and_in_models():
     catalogue = succeed("effects").stdout
     assert "dead_zone: −k_i f_i exp(−(f_i/w)²)\n" in catalogue
-    assert "settings: width=1 m/s^2" in catalogue
+    assert "settings: width=1 m/s² (above 0)" in catalogue
     assert "shared_noise: √(1 − ρ) v + √ρ σ w" in catalogue
     effects = ("--effect", "dead_zone(width=2): 0.02, 0.01, -0.01")
     effects += ("--noise-effect", "shared_noise")

@@ -22,7 +22,6 @@ from accelstudy.campaign.header import LogLayout
 from accelstudy.campaign.importing.columns import AXES, ORDINARY, resolve_layout
 from accelstudy.campaign.importing.formats import open_source
 from accelstudy.campaign.importing.sources import Source
-from accelstudy.pages.notebook import notebook_html
 from accelstudy.sensors.conversion import MAX_VALUE
 
 Array = NDArray[np.float64]
@@ -68,6 +67,8 @@ class Log:
         return f"Log({', '.join([repr(self.name), *self.given])})"
 
     def _repr_html_(self) -> str:
+        from accelstudy.pages.notebook import notebook_html
+
         given = pd.DataFrame(self.given.items(), columns=["setting", "value"], dtype=object)
         return notebook_html("Log", self.name, given)
 

@@ -33,6 +33,8 @@ Array = NDArray[np.float64]
 
 ROUNDING = 1e-9
 """Share of a signature that rounding errors may leave where nothing is left."""
+DIGITS = 6
+"""Decimals to which cosines that are equal agree."""
 
 
 class Candidates(NamedTuple):
@@ -214,12 +216,12 @@ class SessionFit:
         return same
 
     def nearest(self, hypothesis: Hypothesis) -> tuple[tuple[str, float], ...]:
-        """Other effects and their largest canonical cosines, nearest first."""
+        """Other effects and their largest canonical cosines, nearest first, and then by name."""
         near: dict[str, float] = {}
         for shape, cosine in zip(self._shapes, self._cosines(hypothesis, 1).tolist(), strict=True):
             if shape.name != hypothesis.name:
                 near[shape.name] = max(near.get(shape.name, 0.0), cosine)
-        return tuple(sorted(near.items(), key=lambda item: -item[1]))
+        return tuple(sorted(near.items(), key=lambda item: (-round(item[1], DIGITS), item[0])))
 
     def imitators(self, hypothesis: Hypothesis) -> tuple[str, ...]:
         """Other effects that could leave all that a hypothesis does, and perhaps more."""
