@@ -56,7 +56,7 @@ def estimates(
     """All estimates of a cell with their standard errors, as a study tabulates them."""
     cell = replace(cell, replicates=replicates, compiled=compiled)
     made = simulate(cell, seed)
-    tables = tables_of([statistics(cell, made._replace(linear=None) if plain else made)])
+    tables = tables_of([statistics(cell, made._replace(linear=[]) if plain else made)])
     return pd.concat(_rows(tables), ignore_index=True).assign(cell=cell.name)
 
 

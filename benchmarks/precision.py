@@ -57,7 +57,7 @@ def run(speeds):
 
 def _plain(cell):
     """Statistics without linear theory."""
-    return statistics(cell, simulate(cell, 1)._replace(linear=None))
+    return statistics(cell, simulate(cell, 1)._replace(linear=[]))
 
 
 def _needed(found, count):

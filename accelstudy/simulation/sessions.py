@@ -119,7 +119,8 @@ class Session:
     ) -> Errors:
         """Draw the normal errors of `replicates` sessions, as `draw` does first."""
         n = len(self.forces)
-        force = noise.sigma_force * rng.standard_normal((replicates, n, 3))
+        force = rng.standard_normal((replicates, n, 3))
+        force *= noise.sigma_force
         if not (angles or noise.sigma_gravity > 0 or noise.effects):
             return Errors(force)
         angle = noise.sigma_angle * rng.standard_normal((replicates, n, 2))

@@ -115,17 +115,18 @@ def ratio(x: Array) -> tuple[Array, Array]:
 
 def correlation(x: Array) -> tuple[Array, Array]:
     """Correlations below the diagonal, in the order of `numpy.tril_indices`."""
-    z = (x - x.mean(axis=1, keepdims=True)) / x.std(axis=1, keepdims=True)
     i, j = np.tril_indices(len(x), -1)
-    value, first = (z @ z.T / x.shape[1])[i, j], z[:, :MAX_INFLUENCES]
+    value = np.atleast_2d(np.corrcoef(x))[i, j]
+    centre, scale = np.array([(row.mean(), row.std()) for row in x]).T[:, :, None]
+    first = (x[:, :MAX_INFLUENCES] - centre) / scale
     squares = first[i] ** 2 + first[j] ** 2
     return value, first[i] * first[j] - value[:, None] / 2 * squares
 
 
 def _sd(x: Array) -> Array:
     """Standard deviation of each row; NaN of a single number."""
-    apart = x - x.mean(axis=1, keepdims=True)
-    return np.sqrt(np.einsum("kr,kr->k", apart, apart) / np.float64(x.shape[1] - 1))
+    squares = [apart @ apart for apart in (row - row.mean() for row in x)]
+    return np.sqrt(np.array(squares) / np.float64(x.shape[1] - 1))
 
 
 def controlled(
@@ -232,11 +233,12 @@ def controlled_quantiles(
 
 
 def _quantiles(x: Array, p: Array, wide: Array) -> Array:
-    """Quantiles at p, p − wide and p + wide, (3, k); a sort is faster than `numpy.quantile`."""
-    ordered, place = np.sort(x), (len(x) - 1) * np.array([p, p - wide, p + wide])
+    """Quantiles at p, p − wide and p + wide, (3, k), as of `numpy.quantile`, which is slower."""
+    place = (len(x) - 1) * np.array([p, p - wide, p + wide])
     below = place.astype(int)
-    low, high = ordered[below], ordered[np.minimum(below + 1, len(x) - 1)]
-    return np.asarray(low + (place - below) * (high - low))
+    above = np.minimum(below + 1, len(x) - 1)
+    ordered = np.partition(x, np.union1d(below, above))
+    return np.asarray(ordered[below] + (place - below) * (ordered[above] - ordered[below]))
 
 
 def _sd_near(differences: Array, theory: Array, p: Array, wide: Array) -> Array:

@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterator, Sequence
+from collections.abc import Collection, Iterator
 from dataclasses import replace
-from itertools import islice
-from typing import Any, NamedTuple
+from itertools import islice, zip_longest
+from typing import NamedTuple
 
 import numpy as np
 import pyarrow as pa
@@ -54,13 +54,13 @@ class Replicates(NamedTuple):
 
     Attributes
     ----------
-    simulated : Block, the calibrations
-    linear : Block, those of linear theory of the same noise; None if there is no linear theory, as
-        the session without noise has no calibration
+    simulated : list of Block, the calibrations, `CHUNK` in each; they follow each other
+    linear : list of Block, those of linear theory of the same noise; empty if there is no linear
+        theory, as the session without noise has no calibration
     """
 
-    simulated: Block
-    linear: Block | None
+    simulated: list[Block]
+    linear: list[Block]
 
 
 def simulate(cell: Cell, seed: int) -> Replicates:
@@ -80,34 +80,23 @@ def simulate(cell: Cell, seed: int) -> Replicates:
         BLOCK,
         angles=cell.conditions.uses_angles,
     )
-    simulated, linear = [], []
+    replicates = Replicates([], [])
     while chunk := [*islice(drawn, CHUNK // BLOCK)]:
         together = Observations.concatenate([observed for _, observed in chunk])
-        simulated.append(calibrate(cell.estimated_model, cell.conditions, together))
+        block = calibrate(cell.estimated_model, cell.conditions, together)
+        replicates.simulated.append(block)
         if theory is not None:
-            linear += [_by_theory(theory, cell, errors) for errors, _ in chunk]
-    whole = _joined(simulated)
-    if theory is None:
-        return Replicates(whole, None)
-    estimates, omegas = map(np.concatenate, zip(*linear, strict=True))
-    by_theory = replace(
-        whole,
-        estimates=estimates,
-        sigma_priori=np.broadcast_to(theory.sigma, estimates.shape),
-        omega=omegas,
-        converged=np.ones(len(omegas), bool),
-    )
-    return Replicates(whole, by_theory)
-
-
-def _joined(blocks: Sequence[Block]) -> Block:
-    """Blocks of replicates that follow each other as one."""
-    names = ("estimates", "sigma_priori", "omega", "iterations", "converged")
-    arrays: dict[str, Any] = {
-        name: np.concatenate([getattr(block, name) for block in blocks]) for name in names
-    }
-    total = np.sum([block.correlation_sum for block in blocks], axis=0)
-    return replace(blocks[0], **arrays, correlation_sum=total)
+            each = [_by_theory(theory, cell, errors) for errors, _ in chunk]
+            estimates, omega = map(np.concatenate, zip(*each, strict=True))
+            by_theory = replace(
+                block,
+                estimates=estimates,
+                sigma_priori=np.broadcast_to(theory.sigma, estimates.shape),
+                omega=omega,
+                converged=np.ones(len(omega), bool),
+            )
+            replicates.linear.append(by_theory)
+    return replicates
 
 
 def _by_theory(theory: LinearTheory, cell: Cell, errors: Errors) -> tuple[Array, Array]:
@@ -121,15 +110,10 @@ def _by_theory(theory: LinearTheory, cell: Cell, errors: Errors) -> tuple[Array,
 
 def estimates_tables(cell: Cell, replicates: Replicates) -> Iterator[pa.Table]:
     """Rows of `ESTIMATES` of a cell, `CHUNK` replicates at a time."""
-    simulated, linear = replicates
-    beside = linear or replace(
-        simulated,
-        estimates=np.full_like(simulated.estimates, np.nan),
-        omega=np.full_like(simulated.omega, np.nan),
-    )
-    for first in range(0, cell.replicates, CHUNK):
-        part = slice(first, first + CHUNK)
-        count, u = simulated.estimates[part].shape
+    first = 0
+    for block, linear in zip_longest(*replicates):
+        count, u = block.estimates.shape
+        nothing = np.full(count, np.nan)
 
         def coded(names: Collection[str], rows: int = count * u) -> pa.DictionaryArray:
             different = [*dict.fromkeys(names)]
@@ -142,13 +126,14 @@ def estimates_tables(cell: Cell, replicates: Replicates) -> Iterator[pa.Table]:
             "parameter": coded(cell.parameter_units.keys()),
             "unit": coded(cell.parameter_units.values()),
             "truth": np.tile(cell.true_values, count),
-            "estimate": simulated.estimates[part].ravel(),
-            "linear_estimate": beside.estimates[part].ravel(),
-            "sigma_priori": simulated.sigma_priori[part].ravel(),
-            "omega": np.repeat(simulated.omega[part], u),
-            "linear_omega": np.repeat(beside.omega[part], u),
-            "redundancy": np.full(count * u, simulated.redundancy),
-            "iterations": np.repeat(simulated.iterations[part], u),
-            "converged": np.repeat(simulated.converged[part], u),
+            "estimate": block.estimates.ravel(),
+            "linear_estimate": linear.estimates.ravel() if linear else np.repeat(nothing, u),
+            "sigma_priori": block.sigma_priori.ravel(),
+            "omega": np.repeat(block.omega, u),
+            "linear_omega": np.repeat(linear.omega if linear else nothing, u),
+            "redundancy": np.full(count * u, block.redundancy),
+            "iterations": np.repeat(block.iterations, u),
+            "converged": np.repeat(block.converged, u),
         }
         yield pa.table(columns, schema=ESTIMATES)
+        first += count

@@ -105,21 +105,22 @@ def statistics(
     replicates : Replicates
     levels : probabilities of the quantiles; by default those that so many replicates can have
     """
-    converged = replicates.simulated.converged
-    known = None if replicates.linear is None else KnownValues.of(cell)
+    converged = np.concatenate([block.converged for block in replicates.simulated])
+    known = KnownValues.of(cell) if replicates.linear else None
     control = "linear" if known is not None and len(converged) >= MIN_REPLICATES else "none"
     count = int(converged.sum())
-    correlation = replicates.simulated.correlation_sum / (count or np.nan)
+    total = np.sum([block.correlation_sum for block in replicates.simulated], axis=0)
+    correlation = total / (count or np.nan)
     counts = len(converged), count, control, correlation
     if not count:
         return CellStatistics(cell, *counts)
-    own = _numbers(cell, replicates.simulated)
-    theory = {} if replicates.linear is None else _numbers(cell, replicates.linear)
+    own = _numbers(cell, replicates.simulated, count)
+    theory = _numbers(cell, replicates.linear, len(converged))
     expected = {} if known is None else known.statistics
     estimates = {
-        name: controlled(
-            statistic, own[number], theory.get(number), expected.get(name, np.nan), converged
-        )
+        name: controlled(statistic, own[number], theory.get(number), expected[name], converged)
+        if name in expected
+        else controlled(statistic, own[number], None, np.nan, converged)
         for name, (statistic, number) in STATISTICS.items()
         if name != "correlation" or count > cell.n_unknowns
     }
@@ -141,26 +142,39 @@ def statistics(
     return CellStatistics(cell, *counts, estimates, first, at, quantiles)
 
 
-def _numbers(cell: Cell, block: Block) -> dict[str, Array]:
+def _numbers(cell: Cell, blocks: Sequence[Block], count: int) -> dict[str, Array]:
+    """Numbers as of `_numbers_of` of all blocks, of which so many calibrations converged."""
+    numbers: dict[str, Array] = {}
+    end = 0
+    for block in blocks:
+        start, end = end, end + int(block.converged.sum())
+        for name, part in _numbers_of(cell, block).items():
+            if name not in numbers:
+                numbers[name] = np.empty((len(part), count), part.dtype)
+            numbers[name][:, start:end] = part
+    if numbers:
+        numbers["sigma_posteriori"], numbers["error"] = np.split(numbers["sigma_and_error"], 2)
+    return numbers
+
+
+def _numbers_of(cell: Cell, block: Block) -> dict[str, Array]:
     """Numbers of the c calibrations that converged, (k, c) each, SI; NaN what needs redundancy.
 
-    They are `error`, `sigma_priori`, `sigma_posteriori` and `inside` of each parameter (the last
-    says whether the nominal 95 % interval, estimate ± t σ a posteriori, holds the truth),
-    `variance_factor`, and over the attitudes the mean `tilt_squared` of roll and pitch, and the rms
-    `tilt` as in `TILTS`.
+    They are `sigma_priori` and `inside` of each parameter (the last says whether the nominal 95 %
+    interval, estimate ± t σ a posteriori, holds the truth), `sigma_and_error`, the σ a posteriori
+    and then the errors, `variance_factor`, and over the attitudes the mean `tilt_squared` of roll
+    and pitch, and the rms `tilt` as in `TILTS`.
     """
-    good = block.converged
-    estimates, sigma = (
-        np.ascontiguousarray(each[good].T) for each in (block.estimates, block.sigma_priori)
+    estimates, sigma, omega = (
+        np.compress(block.converged, each.T, axis=-1)
+        for each in (block.estimates, block.sigma_priori, block.omega)
     )
-    factor = block.omega[None, good] / (block.redundancy or np.nan)
+    factor = omega[None] / (block.redundancy or np.nan)
     error, posteriori = estimates - cell.true_values[:, None], np.sqrt(factor) * sigma
     squares = cell.tilt_error.squares(estimates[: cell.estimated_model.n_parameters].T).T
     tilt = np.sqrt(squares)
     return {
-        "error": error,
         "sigma_priori": sigma,
-        "sigma_posteriori": posteriori,
         "sigma_and_error": np.concatenate([posteriori, error]),
         "inside": np.abs(error) <= sigmas_95(block.redundancy) * posteriori,
         "variance_factor": factor,

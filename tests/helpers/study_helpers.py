@@ -37,13 +37,14 @@ def make_cells(*grids, **keys):
 
 
 def simulated(cell, seed=1):
-    """The calibrations of a cell."""
-    return simulate(cell, seed).simulated
+    """The calibrations of a small cell."""
+    (block,) = simulate(cell, seed).simulated
+    return block
 
 
 def plain(cell, seed):
     """Statistics of a cell without linear theory."""
-    return statistics(cell, simulate(cell, seed)._replace(linear=None))
+    return statistics(cell, simulate(cell, seed)._replace(linear=[]))
 
 
 def simulate_cells(folder, cells, seed=1):
