@@ -120,7 +120,8 @@ class Search:
     def _from_start(self, n: int, start: int) -> Array:
         """Positions that a search from one random set ends in, (n, 3)."""
         if (n, start) not in self._settled:
-            self._settled[n, start] = self._settle(self.exchange(n, start))
+            chosen = self.exchange(n, start)
+            self._settled[n, start] = settle(self.task, self.criterion, self.allowed, chosen)
         return self._settled[n, start]
 
     def exchange(self, n: int, start: int) -> Array:
@@ -148,10 +149,6 @@ class Search:
                 break
         return self.candidates[chosen]
 
-    def _settle(self, directions: Array) -> Array:
-        """Positions that have moved to where no small move gains, if they can move."""
-        return settle(self.task, self.criterion, self.allowed, directions)
-
     def _join(self, directions: Array) -> Array:
         """Positions that lie close together replaced by one of them, repeated.
 
@@ -163,7 +160,7 @@ class Search:
             first = first[first]
         if np.array_equal(first, np.arange(len(directions))):
             return directions
-        joined = self._settle(directions[first])[first]
+        joined = settle(self.task, self.criterion, self.allowed, directions[first])[first]
         loss = self.value(joined) - self.value(directions)
         return joined if loss <= MAX_JOINING_LOSS else directions
 

@@ -53,11 +53,6 @@ class Tilt:
         factors = np.array([factor if cause == NOISE else 1.0 for cause in self.causes])
         return replace(self, form=self.form * np.outer(factors, factors))
 
-    def of(self, cause: str) -> Tilt:
-        """Return the tilt that one cause leaves by itself."""
-        own = [i for i, each in enumerate(self.causes) if each == cause]
-        return Tilt(self.form[:, own][:, :, own], (cause,) * len(own))
-
     @cached_property
     def squares(self) -> dict[str, Array]:
         """Mean square of the errors of roll and of pitch, (2,), rad², by each cause."""
@@ -72,8 +67,9 @@ class Tilt:
 
     @cached_property
     def _chi_squared(self) -> tuple[Array, Array]:
-        """Factor and degrees of freedom, (2,)."""
-        return scaled_chi_squared(self.rms**2, 2 * np.sum(self.form**2, axis=(1, 2)))
+        """Factor and degrees of freedom of the scaled χ², (2,)."""
+        mean, variance = self.rms**2, 2 * np.sum(self.form**2, axis=(1, 2))
+        return variance / (2 * mean), 2 * mean**2 / variance
 
     def quantile(self, probability: float) -> Array:
         """Error of each angle by itself that this share of the calibrations stays below, (2,)."""
@@ -91,11 +87,6 @@ class Tilt:
         squares = np.linspace(ends[0] ** 2, ends[1] ** 2, STEPS_OF_BOTH)[:, None]
         both = scipy.special.chdtr(freedom, squares / factor).prod(axis=1)
         return float(np.sqrt(np.interp(probability, both, squares[:, 0])))
-
-
-def scaled_chi_squared(mean: Array, variance: Array) -> tuple[Array, Array]:
-    """Factor and degrees of freedom of the scaled χ² with a mean and a variance."""
-    return variance / (2 * mean), 2 * mean**2 / variance
 
 
 @dataclass(frozen=True)

@@ -22,6 +22,7 @@ from numpy.typing import ArrayLike, NDArray
 from accelstudy.basics.shares import Z95
 from accelstudy.basics.units import GON, MGON, STANDARD_GRAVITY
 from accelstudy.leveling.angles import angles_of, specific_force, wrap_angle
+from accelstudy.sensors.models import compose
 from accelstudy.sensors.sensor import SensorModel
 
 Array = NDArray[np.float64]
@@ -29,6 +30,8 @@ Array = NDArray[np.float64]
 FORCES = ("f_x", "f_y", "f_z")
 OUTPUTS = ("roll", "pitch")
 
+FORCE_ALONE = compose("", ())
+"""The model without parameters, whose output is the force itself."""
 NEGLIGIBLE_VARIANCE = 1e-24
 """Variance in rad² below which an output does not vary: rounding, not an effect."""
 
@@ -95,14 +98,14 @@ def _standard_normal(d: int, base_samples: int, seed: int) -> Array:
 
 
 def leveling_function(
-    attitude: Array, model: SensorModel | None, g: float = STANDARD_GRAVITY
+    attitude: Array, model: SensorModel, g: float = STANDARD_GRAVITY
 ) -> Callable[[Array], Array]:
     """Return leveling near an attitude as a function of its uncertain inputs.
 
     Parameters
     ----------
     attitude : (2,) array, rad
-    model : SensorModel, or None if the output is the force itself
+    model : SensorModel
     g : float, m/s²
 
     Returns
@@ -113,9 +116,7 @@ def leveling_function(
     """
 
     def offset(inputs: Array) -> Array:
-        force = inputs[:, :3]
-        if model is not None:
-            force = model.correct(force[:, None, :], inputs[:, 3:], g)[:, 0]
+        force = model.correct(inputs[:, None, :3], inputs[:, 3:], g)[:, 0]
         return wrap_angle(angles_of(force) - attitude)
 
     return offset
@@ -127,9 +128,9 @@ def leveling_sensitivity(
     sigma_force: float,
     base_samples: int,
     seed: int,
-    model: SensorModel | None = None,
-    parameters: Array | None = None,
-    sigma_parameters: Array | None = None,
+    model: SensorModel = FORCE_ALONE,
+    parameters: ArrayLike = (),
+    sigma_parameters: ArrayLike = (),
     g: float = STANDARD_GRAVITY,
 ) -> pd.DataFrame:
     """Total effects on roll and pitch over a grid of attitudes.
@@ -149,17 +150,14 @@ def leveling_sensitivity(
         output, roll_gon, pitch_gon, input, total_effect, ci95, sd_output_mgon, defined; where the
         output has no variance the total effect is NaN and `defined` False.
     """
-    names = [*FORCES, *(() if model is None else model.parameter_names)]
-    x = np.zeros(len(names) - 3) if parameters is None else parameters
-    no_sigma = np.zeros_like(x) if sigma_parameters is None else sigma_parameters
-    sigma = np.concatenate([np.full(3, sigma_force), no_sigma])
+    names, x = [*FORCES, *model.parameter_names], np.asarray(parameters, dtype=float)
+    sigma = np.concatenate([np.full(3, sigma_force), sigma_parameters])
     effects = []
     for roll, pitch in product(roll_gon, pitch_gon):
         attitude = np.array([roll * GON, pitch * GON])
-        f_s = np.array(specific_force(attitude[0], attitude[1], g))
-        if model is not None:
-            f_s = model.sense(f_s[None], x, g)[0]
-        of_inputs, mean = leveling_function(attitude, model, g), np.concatenate([f_s, x])
+        f_b = np.array(specific_force(attitude[0], attitude[1], g))
+        mean = np.concatenate([model.sense(f_b[None], x, g)[0], x])
+        of_inputs = leveling_function(attitude, model, g)
         effects.append(total_effects(of_inputs, mean, sigma, base_samples, seed))
     total, ci95, sd = (np.array(each) for each in zip(*effects, strict=True))
     return effects_table(roll_gon, pitch_gon, names, sd, {"total_effect": total, "ci95": ci95})

@@ -28,7 +28,6 @@ import pandas as pd
 from numpy.typing import ArrayLike, NDArray
 
 from accelstudy.basics.units import GON, STANDARD_GRAVITY
-from accelstudy.effects import HoldConditions
 from accelstudy.leveling.angles import specific_force, tilt_by_output, tilt_slope
 from accelstudy.leveling.sensitivity import FORCES, NEGLIGIBLE_VARIANCE, effects_table
 from accelstudy.sensors.sensor import SensorModel
@@ -47,25 +46,6 @@ With the sds of 100 000 calibrations the shares are uncertain by 0.6 %.
 """
 SINGULAR = 1e-12
 """Eigenvalues of a correlation matrix below this share of the largest one count as zero."""
-
-
-def leveling_slope(
-    model: SensorModel, parameters: Array, f_s: Array, g: float, hold: HoldConditions | None = None
-) -> Array:
-    """Derivatives of roll and pitch by the sensor's output and the parameters, (..., 2, 3 + u).
-
-    Parameters
-    ----------
-    model, parameters : sensor model and its (u,) parameters, SI
-    f_s : (..., 3) array, m/s², output of the sensor
-    g : float, m/s²
-    hold : HoldConditions, optional
-        What else is known of the attitudes, where effects depend on it.
-    """
-    f_b = model.correct(f_s, parameters, g, hold)
-    by_output = tilt_by_output(model, parameters, f_s, f_b, g, hold)
-    by_parameters = tilt_slope(model, parameters, f_s, f_b, g, hold)
-    return np.concatenate([by_output, by_parameters], axis=-1)
 
 
 def leveling_shares(
@@ -102,7 +82,8 @@ def leveling_shares(
     attitudes = np.array(list(product(roll_gon, pitch_gon))) * GON
     f_b = np.stack(specific_force(attitudes[:, 0], attitudes[:, 1], g), axis=-1)
     f_s = model.sense(f_b, parameters, g)
-    slopes = leveling_slope(model, parameters, f_s, g)
+    at = model, parameters, f_s, f_b, g
+    slopes = np.concatenate([tilt_by_output(*at), tilt_slope(*at)], axis=-1)
     shares, variance = linear_shapley(slopes.reshape(-1, len(names)), whole)
     shares, variance = shares.reshape(slopes.shape), variance.reshape(slopes.shape[:2])
     total = (slopes * sigma) ** 2

@@ -11,10 +11,8 @@ from typing import Any
 import numpy as np
 
 from accelstudy.approaches import get_approach
-from accelstudy.basics.arguments import tidy
 from accelstudy.basics.errors import InputError, UnknownNameError
 from accelstudy.basics.progress import begin, track
-from accelstudy.basics.units import GON, MGON
 from accelstudy.data_sheets import get_data_sheet, sheet_of_sigma
 from accelstudy.design.criteria import MINIMAX, get_criterion
 from accelstudy.design.search import Search
@@ -170,13 +168,12 @@ class CalibrationKind:
         return most if left >= most * each else math.floor(left / each + 1e-9)
 
     def search(self, n: int) -> Search:
-        """Search for the best n positions, as `accelstudy design` makes it."""
+        """Search for the best n positions."""
         noise, question = Noise(), self.question
         if self.equipment.name != "gravity":  # with a single noise the best positions are the same
-            angle = tidy(question.sigma_angle / MGON, 6) * MGON
-            noise = Noise(sigma_of(question, self.equipment, n, self.hold), angle)
-        tilt_range = tidy(question.tilt_range / GON, 6) * GON
-        return _search(self.model.name, self.equipment.name, noise, tilt_range)
+            sigma = sigma_of(question, self.equipment, n, self.hold)
+            noise = Noise(sigma, question.sigma_angle)
+        return _search(self.model.name, self.equipment.name, noise, question.tilt_range)
 
     def best(self, n: int, starts: int = 1) -> Candidate | None:
         """Calibration in the best n positions; None if so many are not allowed, or too few.
@@ -190,7 +187,7 @@ class CalibrationKind:
             return None
         search = self.search(n)
         directions = search.optimum(n, starts, bounded=False).directions.tolist()
-        content = {"title": MINIMAX, "source": "accelstudy design", "directions": directions}
+        content = {"title": MINIMAX, "source": "accelstudy plan", "directions": directions}
         scheme = parse_scheme(content, f"{MINIMAX}-{n}")
         alone = replace(self.question, holds=(self.hold,), equipment=(self.equipment,))
         found = next(in_scheme(alone, scheme, [self.model]), None)

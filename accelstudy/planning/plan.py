@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field
-from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -24,7 +23,6 @@ if TYPE_CHECKING:
     import pandas as pd
     from matplotlib.axes import Axes
 
-SHOWN = ["equipment", "model", "scheme", "n_positions", "hold_s", "minutes"]
 ANGLES = ("roll", "pitch")
 
 
@@ -83,20 +81,15 @@ class Plan(Result):
     @property
     def content(self) -> dict[str, Any]:
         """State, verdict and the cheapest calibrations."""
-        calibrations = self.table.reset_index().to_dict("records")
+        calibrations = self.to_frame().reset_index().to_dict("records")
         return {"state": self.state, "verdict": self.verdict, "calibrations": calibrations}
 
-    @cached_property
-    def table(self) -> pd.DataFrame:
-        """The cheapest calibrations that reach the accuracy, by rank; angles are in mgon."""
+    def to_frame(self) -> pd.DataFrame:
+        """Return the cheapest calibrations that reach the accuracy, by rank; angles are in mgon."""
         import pandas as pd  # slow to import, and not needed for what is printed
 
         rows = [_row(self.question, candidate) for candidate in self.ranked]
         return pd.DataFrame(rows, index=pd.RangeIndex(1, len(rows) + 1, name="rank"))
-
-    def to_frame(self) -> pd.DataFrame:
-        """Return what the cheapest calibrations take, by rank; `table` has all that is known."""
-        return self.table.reindex(columns=SHOWN)
 
     def draw(self, ax: Axes) -> None:
         """Draw the tilt error left over the time in the field."""
@@ -117,12 +110,12 @@ class Plan(Result):
         if not self.ranked:
             raise InputError(self.verdict)
         provenance = {"config_hash": None, "seed": self.seed}
-        write_table(folder / "plan.parquet", self.table.reset_index(), provenance)
+        write_table(folder / "plan.parquet", self.to_frame().reset_index(), provenance)
         first = self.first
         directions = first.scheme.directions
         if first.search is not None:
             directions = directions[field_order(first.search.task, directions)]
-        made = wording.positions_command(first), directions, {"made_by": "accelstudy plan"}
+        made = f"accelstudy plan, seed {self.seed}", directions, {"made_by": "accelstudy plan"}
         write_scheme(folder / "positions.yaml", "plan", "of plan", *made)
         with mpl.rc_context(STYLE):  # type: ignore[arg-type]
             figure = new_figure(*self.size)
@@ -135,26 +128,22 @@ class Plan(Result):
         if not self.ranked:
             show(self.verdict)
             return
-        answer, how_to, reasons, assumptions = (
+        answer, reasons, assumptions = (
             "\n".join(wording.part_lines(part, self))
-            for part in ("answer", "how_to", "reasons", "assumptions")
+            for part in ("answer", "reasons", "assumptions")
         )
         table = "\n".join(wording.table_lines(self))
-        show(f"{answer}\n\n{how_to}")
+        show(answer)
         say(f"\n{table}\n\n{reasons}\n\n{assumptions}\n")
         if place is None:
-            say("--out FOLDER keeps the table, the figure and the positions.")
+            say("--out FOLDER writes the positions, the table and the figure.")
         else:
-            say(f"plan, table and figure: {place}")
+            say(f"positions, table and figure: {place}")
 
 
 def _row(question: Question, c: Candidate) -> dict[str, Any]:
     assert c.simulated is not None
-    left = {
-        "rms": c.tilt.rms,
-        "rms_simulated": c.simulated.rms,
-        "rms_q95_simulated": c.simulated.quantile(0.95),
-    }
+    left = {"rms": c.tilt.rms, "rms_simulated": c.simulated.rms}
     return {
         "equipment": c.equipment.name,
         "model": c.model.name,

@@ -16,15 +16,15 @@ from accelstudy.simulation.hold_plan import HoldPlan
 from accelstudy.simulation.sessions import Noise
 from accelstudy.study.cell import Cell
 from accelstudy.study.compiling import with_compiled
-from accelstudy.study.statistics import ANGLES, TILT, TILTS, CellStatistics, simulated_statistics
+from accelstudy.study.statistics import TILT, TILTS, CellStatistics, simulated_statistics
 
 Array = NDArray[np.float64]
 
 SIGNS = np.array([1.0, -1.0, 1.0])
 """Signs of the parameters of the three axes of the simulated sensor; all have the usual size."""
 BOTH = TILTS[-1]
-QUOTED_SHARES = (0.025, 0.95, 0.975)
-"""Shares of the calibrations that a plan quotes."""
+QUOTED = 0.95
+"""Share of the calibrations that a plan quotes, whatever is asked for."""
 BASE_EFFECTS = ("bias", "scale", "nonorthogonality")
 """Effects that every simulated sensor has."""
 
@@ -45,25 +45,18 @@ class SimulatedTilt:
         """Rms over attitudes and calibrations, (2,), rad."""
         return self.statistics["tilt_rms"].value
 
-    def quantile(self, probability: float) -> Array:
-        """Error of each angle by itself that this share of the calibrations stayed below, (2,)."""
-        return np.array([self._quantile(name, probability) for name in ANGLES])
-
     def quantile_of_both(self, probability: float) -> float:
         """Error that roll and pitch both stayed below in this share of the calibrations, rad."""
-        return self._quantile(BOTH, probability)
-
-    def _quantile(self, name: str, probability: float) -> float:
-        return float(self.statistics.quantile(TILT, name, probability).value)
+        return float(self.statistics.quantile(TILT, BOTH, probability).value)
 
 
 def simulate_candidate(
     question: Question, candidate: Candidate, seed: int, replicates: int
 ) -> SimulatedTilt:
-    """Simulate a candidate, with quantiles at some usual shares, and at that of the question."""
-    shares = {*QUOTED_SHARES, question.confidence} - {None}
+    """Simulate a candidate, with quantiles at the usual share and at that of the question."""
+    shares = {QUOTED, question.confidence or QUOTED}
     (cell,) = with_compiled([cell_of(question, candidate, replicates)])
-    return SimulatedTilt(simulated_statistics(cell, seed, np.sort([*shares])))
+    return SimulatedTilt(simulated_statistics(cell, seed, np.array(sorted(shares))))
 
 
 def cell_of(question: Question, candidate: Candidate, replicates: int) -> Cell:

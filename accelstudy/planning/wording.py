@@ -10,28 +10,23 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from accelstudy.basics.units import GON, MGON, angle_note, display_unit, to_display  # noqa: F401
-from accelstudy.basics.wording import amount, interval, number, quantity_text, words
-from accelstudy.design.criteria import MINIMAX
+from accelstudy.basics.units import angle_note, display_unit  # noqa: F401
+from accelstudy.basics.wording import amount, quantity_text
 from accelstudy.pages import render_lines
 from accelstudy.planning import reasons
 from accelstudy.planning.candidates import Candidate, shortest  # noqa: F401
 from accelstudy.planning.question import Question
-from accelstudy.sensors.models import NINE
-from accelstudy.sensors.sensor import SensorModel
+from accelstudy.planning.simulated import QUOTED
 
 if TYPE_CHECKING:
     from accelstudy.planning.plan import Plan
 
 SENTENCES = "planning/wording.txt.j2"
-QUOTED = 0.95
-"""Share of the calibrations that is quoted where the rms is asked for."""
-
 HERE = sys.modules[__name__]
 
 
 def part_lines(part: str, plan: Plan) -> list[str]:
-    """Lines of a part of a plan: what to do (answer), how_to, reasons or assumptions."""
+    """Lines of a part of a plan: what to do (answer), reasons or assumptions."""
     return render_lines(SENTENCES, part, plan, HERE)
 
 
@@ -58,61 +53,23 @@ def table_lines(plan: Plan) -> list[str]:
     ]
     return [
         *("  ".join(cells).rstrip() for cells in zip(*aligned, strict=True)),
-        "model: number of parameters, and effects besides bias, scale and angles between axes;",
-        "roll, pitch: rms, and interval with 95 of 100 calibrations of each angle by itself, from",
-        f"{plan.replicates} simulated ones each;",
-        "both: what roll and pitch both stay below in 95 of 100 calibrations",
+        f"roll, pitch: rms of {plan.replicates} simulated calibrations each; both: what roll and",
+        "pitch both stay below in 95 of 100 of them",
     ]
 
 
 def _row(plan: Plan, rank: int, candidate: Candidate) -> list[str]:
     left = candidate.simulated
     assert left is not None
-    ends = (left.rms, left.quantile(0.025), left.quantile(0.975))
-    cells = [
-        f"{number(rms)} ({interval(low, high)})"
-        for rms, low, high in zip(*(to_display(v, "rad") for v in ends), strict=True)
-    ]
     return [
         f"{rank}.",
         candidate.equipment.how,
-        model_words(candidate.model),
+        candidate.model.name,
         candidate.scheme.name.partition("@")[0],
         str(candidate.scheme.n_positions),
         f"{candidate.hold:g}",
         f"{candidate.seconds / 60:.1f}",
-        *cells,
+        *(amount(rms, "rad") for rms in left.rms),
         amount(left.quantile_of_both(QUOTED), "rad"),
         reasons.limits(plan.question, candidate),
     ]
-
-
-def model_words(model: SensorModel) -> str:
-    """A model by its number of parameters and its effects besides the usual nine parameters."""
-    nine = {"bias", "scale", "nonorthogonality"}
-    effects = [effect.name for effect in model.effects]
-    more = [words(name.removesuffix("_scale")) for name in effects if name not in nine]
-    less = [] if nine <= set(effects) else ["no angles between axes"]
-    short = [name.replace("cross axis misalignment", "cross-axis") for name in (*more, *less)]
-    return " + ".join([str(model.n_parameters), *short])
-
-
-def positions_command(candidate: Candidate) -> str:
-    """The command that shows, or finds again, the positions of a candidate."""
-    if candidate.search is None:
-        return f"accelstudy scheme {candidate.scheme.name}"
-    task = candidate.search.task
-    options = {
-        "positions": str(candidate.scheme.n_positions),
-        "approach": candidate.equipment.name,
-        "model": candidate.model.name,
-        "criterion": MINIMAX,
-        "tilt-range": f"{task.tilt_range / GON:.6g}gon",
-        "sigma": f"{task.noise.sigma_force:.4g}m/s2",
-        "robot-sigma": f"{task.noise.sigma_angle / MGON:.6g}mgon",
-        "starts": str(candidate.starts),
-        "out": "positions.yaml",
-    }
-    usual = {"model": NINE, "sigma": "0.002m/s2", "robot-sigma": "3.2mgon", "approach": "robot"}
-    given = (f"--{name} {text}" for name, text in options.items() if text != usual.get(name))
-    return " ".join(["accelstudy design", *given])

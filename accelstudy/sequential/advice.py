@@ -30,26 +30,6 @@ if TYPE_CHECKING:
 Array = NDArray[np.float64]
 
 
-@dataclass(frozen=True)
-class NoiseTaken:
-    """Noise of a position by which the accuracy is judged, m/s².
-
-    Attributes
-    ----------
-    stated : float or None, by the campaign
-    seen : float or None, from the residuals; None without redundancy
-    taken : float or None, the one that is used; None as long as it is unknown
-    refuted : bool, whether the residuals contradict the stated noise
-    redundancy : int
-    """
-
-    stated: float | None
-    seen: float | None
-    taken: float | None
-    refuted: bool
-    redundancy: int
-
-
 @dataclass(frozen=True, eq=False, repr=False)
 class Advice(Result):
     """What to do next in a session.
@@ -64,7 +44,10 @@ class Advice(Result):
     suspects : tuple of int, numbers of positions that contradict the others; they are used
     calibration_state : str, state of a calibration with these positions; empty if there is none yet
     undetermined : tuple of str, parameters that the positions do not determine yet
-    noise : NoiseTaken
+    sigma_seen : float or None, m/s², noise of a position by the residuals; None without redundancy
+    sigma_taken : float or None, m/s², by which the accuracy is judged; None as long as it is
+        unknown. It is the stated one, if there is one and the residuals do not refute it.
+    redundancy : int
     rms : (2,) array, rad, of roll and of pitch; None as long as it is not known
     next : (3,) array, direction of gravity in the body frame in the position to take next
     to_go : int or None, positions still needed; None if unknown or too many
@@ -85,7 +68,9 @@ class Advice(Result):
     suspects: tuple[int, ...]
     calibration_state: str
     undetermined: tuple[str, ...]
-    noise: NoiseTaken
+    sigma_seen: float | None
+    sigma_taken: float | None
+    redundancy: int
     rms: Array | None
     next: Array
     to_go: int | None

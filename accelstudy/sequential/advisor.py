@@ -34,7 +34,7 @@ from accelstudy.effects import HoldConditions
 from accelstudy.effects.hold_conditions import REFERENCE_TEMPERATURE
 from accelstudy.sensors.models import get_model
 from accelstudy.sensors.sensor import SensorModel
-from accelstudy.sequential.advice import Advice, NoiseTaken
+from accelstudy.sequential.advice import Advice
 from accelstudy.sequential.choice import (
     DEFAULTS,
     Chooser,
@@ -151,6 +151,7 @@ def advise(
         variance = 1.0 if trusted else known.omega / known.redundancy
         to_go = chooser.positions_to_go(known, variance, rms, last)
     suspects = () if assessed is None else assessed.suspects
+    seen, taken = _sigmas(known, campaign.sigma_force, trusted, noise.sigma_force)
     advice = Advice(
         name=campaign.name,
         session=campaign,
@@ -162,7 +163,9 @@ def advise(
         suspects=tuple(sorted(int(campaign.positions[s.position]) for s in suspects)),
         calibration_state="" if assessed is None else assessed.state,
         undetermined=() if known.determined else _undetermined(campaign, model, approach, known),
-        noise=_noise_taken(known, campaign, trusted, noise.sigma_force),
+        sigma_seen=seen,
+        sigma_taken=taken,
+        redundancy=known.redundancy,
         rms=rms if np.isfinite(rms).all() else None,
         next=directions[chooser.choose(known, rms, last)],
         to_go=to_go,
@@ -218,19 +221,16 @@ def _undetermined(
     return tuple(name for name in theory.not_estimable if name in model.parameter_names)
 
 
-def _noise_taken(known: Knowledge, campaign: Campaign, trusted: bool, unit: float) -> NoiseTaken:
-    """Noise of a position by which the accuracy is judged."""
-    stated, r = campaign.sigma_force, known.redundancy
-    seen, taken = None, stated
-    if known.determined and r > 0:
-        seen = unit * float(np.sqrt(known.omega / r))
-    refuted = stated is not None and not trusted
-    if refuted:
-        taken = seen
-    elif stated is None:
-        largest = float(np.sqrt(bound(known.omega, r)))
-        taken = unit * largest if np.isfinite(largest) else None
-    return NoiseTaken(stated, seen, taken, refuted, r)
+def _sigmas(
+    known: Knowledge, stated: float | None, trusted: bool, unit: float
+) -> tuple[float | None, float | None]:
+    """Noise of a position by the residuals, and that by which the accuracy is judged, m/s²."""
+    omega, r = known.omega, known.redundancy
+    seen = unit * float(np.sqrt(omega / r)) if known.determined and r > 0 else None
+    if stated is not None:
+        return seen, stated if trusted else seen
+    largest = unit * float(np.sqrt(bound(omega, r)))
+    return seen, largest if np.isfinite(largest) else None
 
 
 def next_holds(campaign: Campaign, directions: Array) -> HoldConditions:

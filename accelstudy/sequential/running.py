@@ -15,7 +15,7 @@ from accelstudy.campaign.format import (
     parse_table,
     read_header,
 )
-from accelstudy.campaign.header import HEADER, TABLE, Header
+from accelstudy.campaign.header import TABLE, Header
 from accelstudy.campaign.session import Campaign
 from accelstudy.files.reading import read_text
 
@@ -30,11 +30,6 @@ def read_running(folder: str | Path) -> Campaign:
         there yet.
     """
     folder = Path(folder)
-    if not folder.is_dir():
-        raise InputError(
-            f"{folder}: no such folder; a running session has one with {HEADER}, and its positions "
-            "in positions.csv"
-        )
     header, path = read_header(folder), folder / TABLE
     try:
         text = read_text(path) if path.exists() else ""

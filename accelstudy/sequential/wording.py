@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -10,12 +9,8 @@ from numpy.typing import NDArray
 
 from accelstudy import pages
 from accelstudy.basics.units import attitude_unit, to_attitude
-from accelstudy.basics.wording import comma_list, words
-from accelstudy.effects import Effect
 from accelstudy.leveling.angles import roll_pitch
 from accelstudy.sensors.frames import FRD, Frame
-from accelstudy.sensors.models import compose
-from accelstudy.sensors.sensor import SensorModel
 from accelstudy.sequential.promise import LEAST_REDUNDANCY
 
 if TYPE_CHECKING:
@@ -27,19 +22,16 @@ SENTENCES = "sequential/wording.txt.j2"
 LEVEL = np.radians(0.5)
 """An axis within this of the horizon is level, one within this of the vertical straight up or
 down."""
-CHANGING = {"time": "times", "temperature": "temperatures", "vibration": "vibration"}
-"""Conditions other than the attitude on which effects depend."""
 
 
 def advice_lines(advice: Advice) -> list[str]:
     """Write the advice, most important last."""
-    campaign, model = advice.session, advice.model
+    log = advice.session.log
     return pages.render_lines(
         SENTENCES,
         "lines",
         advice,
-        _by_effect(advice.undetermined, model),
-        attitude(advice.next, FRD if campaign.log is None else campaign.log.axes),
+        attitude(advice.next, FRD if log is None else log.axes),
         LEAST_REDUNDANCY,
     )
 
@@ -83,22 +75,3 @@ def _axis(name: str, down: float) -> str:
 def _angle(angle: float) -> str:
     value = round(float(to_attitude(angle)), 1) + 0.0
     return f"{value:g} {attitude_unit()}"
-
-
-def _by_effect(names: Sequence[str], model: SensorModel) -> str:
-    """Group parameters by their effects: bias (b_x, b_y), scale."""
-    parts = []
-    for effect in model.effects:
-        of_effect = [parameter.name for parameter in effect.parameters]
-        named = [name for name in of_effect if name in names]
-        if named:
-            some = "" if named == of_effect else f" ({', '.join(named)})"
-            parts.append(f"{words(effect.name)}{some}{_needs(effect)}")
-    return comma_list(parts)
-
-
-def _needs(effect: Effect) -> str:
-    """What must change between positions for an effect to be seen, besides the attitude."""
-    columns = compose(effect.spec, (effect.spec,)).hold_columns
-    needed = [f"other {word}" for column, word in CHANGING.items() if column in columns]
-    return f" [needs {comma_list(needed)}]" if needed else ""

@@ -25,7 +25,7 @@ plan
 
 # %%
 print(plan.verdict)
-plan.table[["equipment", "n_positions", "minutes", "roll_rms_simulated_mgon", "limited_by"]]
+plan.to_frame()[["equipment", "n_positions", "minutes", "roll_rms_simulated_mgon", "limited_by"]]
 
 # %% [markdown]
 # All that was compared is in the figure. A point is a model, a scheme, a number of positions and a
@@ -52,8 +52,8 @@ print(surer.verdict)
 # must be about what was asked for.
 
 # %%
-surer.save("plan")
-best = surer.table.iloc[0]
+surer.save("plan", force=True)
+best = surer.to_frame().iloc[0]
 check = acs.simulate(
     best["model"],
     "plan/positions.yaml",

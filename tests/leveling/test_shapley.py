@@ -8,11 +8,10 @@ from usual import GRAVITY, NINE, PAPER, G
 
 from accelstudy.basics.units import GON
 from accelstudy.design.estimability import estimability
-from accelstudy.leveling.angles import specific_force
+from accelstudy.leveling.angles import specific_force, tilt_by_output, tilt_slope
 from accelstudy.leveling.sensitivity import leveling_function, leveling_sensitivity
 from accelstudy.leveling.shares import (
     leveling_shares,
-    leveling_slope,
     linear_shapley,
     order_changes,
 )
@@ -117,7 +116,8 @@ def test_the_slope_is_the_derivative():
     mean, function = np.concatenate([f_s[0], PAPER]), leveling_function(attitude, NINE)
     step = 1e-5 * np.eye(len(NAMES))
     numeric = (function(mean + step) - function(mean - step)).T / 2e-5
-    slope = leveling_slope(NINE, PAPER, f_s, G)[0]
+    at = NINE, PAPER, f_s, NINE.correct(f_s, PAPER, G), G
+    slope = np.concatenate([tilt_by_output(*at), tilt_slope(*at)], axis=-1)[0]
     np.testing.assert_allclose(slope, numeric, rtol=1e-6, atol=1e-8)
 
 

@@ -44,7 +44,8 @@ def test_what_is_missing_is_found(ran):
 def test_a_plan_keeps_what_it_promises(ran):
     names = ran["planning"]
     assert names["plan"].verdict.startswith("You need no robot.")
-    assert names["surer"].table["n_positions"].iloc[0] > names["plan"].table["n_positions"].iloc[0]
+    surer, plan = (names[key].to_frame()["n_positions"].iloc[0] for key in ("surer", "plan"))
+    assert surer > plan
     assert names["below"] == pytest.approx(0.95, abs=0.03)  # 4 standard errors of either simulation
 
 
