@@ -25,17 +25,16 @@ class KnownValues:
 
     Parameters
     ----------
-    cell : Cell
-    theory : LinearTheory, of the cell
+    cell : Cell, which has a linear theory
     """
 
     cell: Cell
-    theory: LinearTheory
 
-    @classmethod
-    def of(cls, cell: Cell) -> KnownValues | None:
-        """Return what is known of a cell, or None if it has no linear theory."""
-        return None if cell.linear_theory is None else cls(cell, cell.linear_theory)
+    @property
+    def theory(self) -> LinearTheory:
+        """Linear theory of the cell."""
+        assert self.cell.linear_theory is not None
+        return self.cell.linear_theory
 
     @cached_property
     def bias(self) -> Array:

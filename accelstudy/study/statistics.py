@@ -106,7 +106,7 @@ def statistics(
     levels : probabilities of the quantiles; by default those that so many replicates can have
     """
     converged = np.concatenate([block.converged for block in replicates.simulated])
-    known = KnownValues.of(cell) if replicates.linear else None
+    known = KnownValues(cell) if replicates.linear else None
     control = "linear" if known is not None and len(converged) >= MIN_REPLICATES else "none"
     count = int(converged.sum())
     total = np.sum([block.correlation_sum for block in replicates.simulated], axis=0)
@@ -118,9 +118,9 @@ def statistics(
     theory = _numbers(cell, replicates.linear, len(converged))
     expected = {} if known is None else known.statistics
     estimates = {
-        name: controlled(statistic, own[number], theory.get(number), expected[name], converged)
-        if name in expected
-        else controlled(statistic, own[number], None, np.nan, converged)
+        name: controlled(
+            statistic, own[number], theory.get(number), expected.get(name, np.nan), converged
+        )
         for name, (statistic, number) in STATISTICS.items()
         if name != "correlation" or count > cell.n_unknowns
     }

@@ -75,6 +75,16 @@ def test_observed_gravity_is_a_parameter(tmp_path):
     assert abs(g["error"].std() / 1e-4 - 1) < 4.5 / np.sqrt(2 * 59)
 
 
+def test_calibrations_do_not_hang_on_how_many_are_made_together(tmp_path, monkeypatch):
+    cells, made = make_cells(grid(replicates=1300)).values(), []
+    for chunk in (10_000, 500):
+        monkeypatch.setattr("accelstudy.study.replicates.CHUNK", chunk)
+        paths = simulate_cells(tmp_path, cells)
+        made.append({name: read_table(path) for name, path in paths.items()})
+    for name, whole in made[0].items():
+        pd.testing.assert_frame_equal(made[1][name], whole, rtol=1e-9)
+
+
 # --- origin --------------------------------------------------------------------------------------
 
 
