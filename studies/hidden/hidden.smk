@@ -9,7 +9,7 @@ include: "../../workflow/rules/start.smk"
 STUDY, RESULTS = configured(parse_hidden, "study")
 VERSION = code_version(workflow.basedir)
 # That of the diagnoses, which take hours: to score them in another way does not run them anew.
-UNUSED = "commands drawing epochs lots pages planning sequential verbs study/figures study/explorer"
+UNUSED = "commands drawing epochs lots planning sequential verbs study/figures study/explorer"
 DIAGNOSING = code_version(
     workflow.basedir, without=[*UNUSED.split(), f"{workflow.basedir}/scoring"]
 )
