@@ -4,14 +4,15 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, Literal
+from typing import TYPE_CHECKING, Annotated, Any
 
-from pydantic import BaseModel, Field
+from pydantic import Field
 
 from accelstudy.adjustment.observations import Known
 from accelstudy.basics.errors import InputError
+from accelstudy.files.documents import Document, Part
 from accelstudy.files.reading import read_layer
-from accelstudy.files.validation import Number, ParameterSigma, ParameterValue, validate
+from accelstudy.files.validation import ParameterSigma, ParameterValue, validate
 from accelstudy.sensors.sensor import SensorModel
 
 if TYPE_CHECKING:
@@ -40,20 +41,26 @@ class SensorType:
     known: Known
 
 
-class TypicalParameter(BaseModel):
-    """A parameter over the sensors of a type, SI."""
+class TypicalParameter(Part):
+    """A parameter over the sensors of a type, SI.
 
-    mean: ParameterValue = Field(description="mean of the type")
-    sigma: ParameterSigma = Field(description="its standard deviation")
-    scatter: ParameterSigma = Field(description="standard deviation from sensor to sensor")
-    scatter_below: ParameterSigma = Field(
-        description="bound below which the scatter is with a probability of 90 %"
-    )
-    unit: str = Field(description="SI unit")
-    in_all: bool = Field(
-        description="whether the next sensor has it, too: all have it, and it belongs to the "
-        "sensor and not to its mounting"
-    )
+    Attributes
+    ----------
+    mean : mean of the type
+    sigma : its standard deviation
+    scatter : standard deviation from sensor to sensor
+    scatter_below : bound below which the scatter is with a probability of 90 %
+    unit : SI unit
+    in_all : whether the next sensor has it, too: all have it, and it belongs to the sensor and not
+        to its mounting
+    """
+
+    mean: ParameterValue
+    sigma: ParameterSigma
+    scatter: ParameterSigma
+    scatter_below: ParameterSigma
+    unit: str
+    in_all: bool
 
     @property
     def sigma_next(self) -> float:
@@ -61,13 +68,20 @@ class TypicalParameter(BaseModel):
         return float((self.scatter_below**2 + self.sigma**2) ** 0.5)
 
 
-class TypeFile(BaseModel):
-    """Content of a file of a type, without the keys of a data sheet."""
+class TypeFile(Document):
+    """A type of sensors; `accelstudy lot` writes it. It has the keys of a data sheet as well.
 
-    schema_version: Annotated[Literal[1], Number] = Field(description="of this format")
-    models: dict[str, Any] = Field(description="model of the type, without sudden effects")
-    sensors: int = Field(ge=1, description="how many were calibrated and are not odd")
-    parameters: dict[str, TypicalParameter] = Field(description="parameters by their names")
+    Attributes
+    ----------
+    models : model of the type, without sudden effects
+    sensors : how many were calibrated and are not odd
+    parameters : parameters by their names
+    """
+
+    file = TYPE_FILE
+    models: dict[str, Any]
+    sensors: Annotated[int, Field(ge=1)]
+    parameters: dict[str, TypicalParameter]
 
 
 def read_type(path: str | Path, model: SensorModel) -> SensorType:
@@ -81,8 +95,7 @@ def read_type(path: str | Path, model: SensorModel) -> SensorType:
     content = read_layer(path)
     if "parameters" not in content:
         raise InputError(f"{path}: no file of a type; `accelstudy lot` writes one, {TYPE_FILE}")
-    known = {key: content[key] for key in TYPE_KEYS if key in content}
-    read = validate(TypeFile, known, path)
+    read = validate(TypeFile, content, path)
     if {*read.parameters} != {*model.parameter_names}:
         raise InputError(
             f"{path}: tells of {', '.join(read.parameters)}, but the model {model.name!r} has "

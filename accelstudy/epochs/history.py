@@ -18,12 +18,12 @@ from accelstudy.basics.dates import read_date
 from accelstudy.basics.errors import InputError, key
 from accelstudy.basics.units import GON, MGON, shown_unit, to_display
 from accelstudy.basics.wording import comma_list, estimate, plural
-from accelstudy.campaign.calibration.document import json_content, write_json
 from accelstudy.campaign.calibration.sensor_calibration import SensorCalibration
 from accelstudy.drawing.saving import save_all
 from accelstudy.drawing.style import FULL, INK, group_colour, group_of, new_figure, symbol
 from accelstudy.epochs.congruence import LEVEL, Congruence
 from accelstudy.epochs.course import YEAR, ParameterCourse
+from accelstudy.epochs.file_format import HistoryDocument
 from accelstudy.epochs.interval import Interval
 from accelstudy.files.outputs import HISTORY
 from accelstudy.leveling.error import ATTITUDES, TiltError, cap_forces, tilt_error
@@ -231,8 +231,7 @@ class History(Result):
         names = ("roll_mgon", "pitch_mgon", "roll_by_chance_mgon", "pitch_by_chance_mgon")
         tilt = zip(names, (self.tilt / MGON).ravel().tolist(), strict=True)
         dates = [date.isoformat() for date in self.dates]
-        content: dict[str, Any] = json_content({
-            "schema_version": 1,
+        return HistoryDocument.content({
             "sensor": self.sensor,
             "calibrations": [
                 {"campaign": one.content["campaign"], "date": dates[i] if dates else None}
@@ -246,7 +245,6 @@ class History(Result):
             "interval": self.interval and self.interval.content,
             "verdict": " ".join(self.sentences),
         })  # fmt: skip
-        return content
 
     def to_frame(self) -> pd.DataFrame:
         """Return the change of each parameter, its rate a year and scatter, and what was found."""
@@ -278,7 +276,7 @@ class History(Result):
             lines=self.sentences,
             figure=save_all({"history": self.figure}, folder / "figures")["history"],
         )
-        write_json(folder / self.kind.marker, self.content)
+        HistoryDocument.write(folder, self.content)
 
     @property
     def _times(self) -> NDArray[Any]:

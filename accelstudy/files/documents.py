@@ -1,16 +1,19 @@
-"""JSON files of results: one model reads, checks and describes each, and gives its JSON Schema."""
+"""Files of results: one model writes, reads, checks and describes each, and gives its schema."""
 
 from __future__ import annotations
 
 import inspect
+import json
 import os
 import re
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Annotated, Any, ClassVar, Literal, Self
 
+import numpy as np
 from pydantic import BaseModel, ConfigDict
 
+from accelstudy.files.outputs import whole_file
 from accelstudy.files.reading import read_json
 from accelstudy.files.validation import Number, validate
 
@@ -21,10 +24,11 @@ ITEM = re.compile(r"^(\w+) : (.+(?:\n {4}.+)*)", re.MULTILINE)
 class Part(BaseModel):
     """A part of a document; keys of later versions are kept as they are.
 
-    What its docstring says of attributes describes the keys, on pages and in the JSON Schema.
+    What its docstring says of attributes describes the keys, on pages and in the JSON Schema. It is
+    made of a mapping, or of an object with these attributes.
     """
 
-    model_config = ConfigDict(extra="allow")
+    model_config = ConfigDict(extra="allow", from_attributes=True)
 
     @classmethod
     def __pydantic_init_subclass__(cls, **settings: Any) -> None:
@@ -63,6 +67,45 @@ class Document(Part):
         return validate(cls, content, ": ".join(filter(None, [where, cls.refusal()])))
 
     @classmethod
+    def content(cls, found: Mapping[str, Any]) -> dict[str, Any]:
+        """Content of the file of what was found, with null for what is no finite number.
+
+        Raises
+        ------
+        InputError
+            If it could not be read again.
+        """
+        known = json_content({"schema_version": 1, **found})
+        document = validate(cls, known, f"cannot make a {cls.file}")
+        content: dict[str, Any] = document.model_dump(by_alias=True, exclude_unset=True)
+        return json_content(content)
+
+    @classmethod
+    def write(cls, folder: Path, content: Mapping[str, Any]) -> None:
+        """Write the file into a folder, whole or not at all."""
+        with whole_file(folder / cls.file) as part:
+            part.write_text(json_text(content), encoding="utf-8")
+
+    @classmethod
     def refusal(cls) -> str:
         """Say that a file holds something else."""
         return f"not a {cls.file} of accelstudy"
+
+
+def json_content(content: Any) -> Any:
+    """Content for JSON: arrays are lists, and what is no finite number is None.
+
+    Records stay as they are: the model of the document reads their attributes.
+    """
+    if isinstance(content, dict):
+        return {key: json_content(value) for key, value in content.items()}
+    if isinstance(content, np.ndarray | np.generic):
+        return json_content(content.tolist())
+    if isinstance(content, list | tuple) and not hasattr(content, "_fields"):
+        return [json_content(value) for value in content]
+    return None if isinstance(content, float) and not np.isfinite(content) else content
+
+
+def json_text(content: Mapping[str, Any]) -> str:
+    """JSON for a file; what is no finite number is null, or the file could not be read again."""
+    return json.dumps(json_content(content), indent=2, ensure_ascii=False, allow_nan=False) + "\n"

@@ -102,9 +102,9 @@ HISTORY = OutputKind(
     ("figures",),
 )
 LOT = OutputKind("lot", "lot.json", ("type.yaml", "report.html"), ("figures", "each"))
-# study.yaml is of folders of 0.3.
-_PLAN_FILES = ("positions.yaml", "study.yaml", "plan.svg", "plan.png")
-PLAN = OutputKind("plan", "plan.parquet", _PLAN_FILES)
+# plan.parquet and study.yaml are of folders of 0.3.
+_PLAN_FILES = ("plan.parquet", "positions.yaml", "study.yaml", "plan.svg", "plan.png")
+PLAN = OutputKind("plan", "plan.json", _PLAN_FILES)
 _TABLES = ("cells", "summary", "correlations", "leveling", "quantiles")
 SIMULATION = OutputKind(
     "simulation", "simulation.json", tuple(f"{name}.parquet" for name in _TABLES)

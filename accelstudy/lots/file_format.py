@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from pydantic import Field
+
 from accelstudy.files.documents import Document, Part
 
 
@@ -167,4 +169,4 @@ class LotDocument(Document):
     left_out: list[LeftOut]
     tilt: Tilt | None
     verdict: str
-    files: list[str]
+    files: list[str] = Field([])

@@ -24,8 +24,8 @@ from accelstudy.basics.progress import say, show
 from accelstudy.basics.units import GON, MGON, shown_unit, to_display
 from accelstudy.basics.wording import comma_list, probability
 from accelstudy.campaign.calibration.assessment import tilt_left
-from accelstudy.campaign.calibration.document import json_content, write_json
 from accelstudy.campaign.calibration.figures import SUSPECT
+from accelstudy.campaign.calibration.file_format import CalibrationDocument
 from accelstudy.campaign.calibration.fit import (
     CampaignFit,
     JudgedNoise,
@@ -56,6 +56,7 @@ from accelstudy.leveling.error import (
     tilt_error,
 )
 from accelstudy.lots.evidence import name_words
+from accelstudy.lots.file_format import LotDocument
 from accelstudy.lots.lot import LotDiagnosis, weigh_lot
 from accelstudy.lots.passes import LEVEL, LotEffect
 from accelstudy.lots.type_file import TypeParameter, write_type
@@ -239,8 +240,7 @@ class Lot(Result):
     def content(self) -> dict[str, Any]:
         """Content of lot.json, in SI."""
         d, tilt = self.diagnosis, self.tilt
-        content: dict[str, Any] = json_content({
-            "schema_version": 1,
+        return LotDocument.content({
             "sensors": len(d.last.sensors),
             "anything": {"p_value": d.p_value, "missing": d.missing, "level": LEVEL},
             "effects": [
@@ -265,7 +265,6 @@ class Lot(Result):
             },
             "verdict": " ".join(self.sentences),
         })  # fmt: skip
-        return content
 
     @property
     def effects(self) -> pd.DataFrame:
@@ -292,7 +291,7 @@ class Lot(Result):
         for i, fit in self.fitted.items():
             its_own = folder / EACH / f"{i + 1:04d}-{path_name(fit.campaign.name, 'sensor')}"
             its_own.mkdir(parents=True)
-            write_json(its_own / "calibration.json", Calibration(fit).content)
+            CalibrationDocument.write(its_own, Calibration(fit).content)
         steps = []
         if write_type(self, folder):
             of_type, approach = place / TYPE_FILE, self.diagnosis.last.sensors[0].approach
@@ -311,7 +310,7 @@ class Lot(Result):
         )
         files = (path for path in folder.rglob("*") if path.is_file())
         names = sorted(path.relative_to(folder).as_posix() for path in files)
-        write_json(folder / "lot.json", {**self.content, "files": names})
+        LotDocument.write(folder, {**self.content, "files": names})
 
     @property
     def _drawn(self) -> Sequence[TypeParameter | None]:

@@ -5,13 +5,14 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Literal
 
 from accelstudy.basics.errors import InputError
 from accelstudy.basics.progress import say, show
 from accelstudy.basics.units import MGON
 from accelstudy.design.order import field_order
 from accelstudy.drawing.style import FULL
+from accelstudy.files.documents import Document, Part
 from accelstudy.files.outputs import PLAN
 from accelstudy.pages.result import Result
 from accelstudy.planning import wording
@@ -24,6 +25,65 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
 ANGLES = ("roll", "pitch")
+
+
+class PlannedCalibration(Part):
+    """A calibration that reaches the accuracy.
+
+    Attributes
+    ----------
+    rank : by the time that it takes; 1 is the quickest
+    equipment : positions by hand, or with a robot
+    model : name of the model
+    n_parameters : of the model
+    scheme : name of the positions
+    n_positions : number of positions
+    hold_s : duration of a position
+    sensor_sigma_mps2 : noise of the mean of a position
+    minutes : time in the field
+    redundancy : conditions minus unknowns
+    limited_by : what limits its accuracy
+    roll_rms_mgon : rms tilt error in roll, by linear theory
+    pitch_rms_mgon : the same in pitch
+    roll_rms_simulated_mgon : rms tilt error in roll over simulated calibrations
+    pitch_rms_simulated_mgon : the same in pitch
+    both_rms_q95_simulated_mgon : bound that both angles stay below in 95 of 100
+    """
+
+    rank: int
+    equipment: Literal["gravity", "robot"]
+    model: str
+    n_parameters: int
+    scheme: str
+    n_positions: int
+    hold_s: float
+    sensor_sigma_mps2: float
+    minutes: float
+    redundancy: int
+    limited_by: str
+    roll_rms_mgon: float
+    pitch_rms_mgon: float
+    roll_rms_simulated_mgon: float
+    pitch_rms_simulated_mgon: float
+    both_rms_q95_simulated_mgon: float
+
+
+class PlanDocument(Document):
+    """The cheapest calibrations for a tilt accuracy; `accelstudy plan --out` writes it.
+
+    Attributes
+    ----------
+    state : whether a calibration reaches the accuracy
+    verdict : what to do
+    seed : of the simulations
+    calibrations : the cheapest ones
+    """
+
+    file = "plan.json"
+    state: Literal["reached", "unreachable"]
+    verdict: str
+    seed: int
+    calibrations: list[PlannedCalibration]
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -80,9 +140,13 @@ class Plan(Result):
 
     @property
     def content(self) -> dict[str, Any]:
-        """State, verdict and the cheapest calibrations."""
-        calibrations = self.to_frame().reset_index().to_dict("records")
-        return {"state": self.state, "verdict": self.verdict, "calibrations": calibrations}
+        """Content of plan.json: the cheapest calibrations."""
+        return PlanDocument.content({
+            "state": self.state,
+            "verdict": self.verdict,
+            "seed": self.seed,
+            "calibrations": self.to_frame().reset_index().to_dict("records"),
+        })  # fmt: skip
 
     def to_frame(self) -> pd.DataFrame:
         """Return the cheapest calibrations that reach the accuracy, by rank; angles are in mgon."""
@@ -104,13 +168,10 @@ class Plan(Result):
 
         from accelstudy.drawing.saving import save
         from accelstudy.drawing.style import DPI, STYLE, new_figure
-        from accelstudy.files.tables import write_table
         from accelstudy.planning.design import write_scheme
 
         if not self.ranked:
             raise InputError(self.verdict)
-        provenance = {"config_hash": None, "seed": self.seed}
-        write_table(folder / "plan.parquet", self.to_frame().reset_index(), provenance)
         first = self.first
         directions = first.scheme.directions
         if first.search is not None:
@@ -122,6 +183,7 @@ class Plan(Result):
             self.draw(figure.subplots())
         for name in ("plan.svg", "plan.png"):
             save(figure, folder / name, "Plan", DPI)
+        PlanDocument.write(folder, self.content)
 
     def tell(self, place: Path | None) -> None:
         """Print the answer, the table and the assumptions."""

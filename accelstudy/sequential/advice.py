@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 import pandas as pd
@@ -15,8 +15,8 @@ from accelstudy.approaches import Approach
 from accelstudy.basics.levels import IMPLAUSIBLE, REJECTED
 from accelstudy.basics.progress import show, warn
 from accelstudy.basics.units import attitude_unit, to_attitude
-from accelstudy.campaign.calibration.document import write_json
 from accelstudy.campaign.session import Campaign
+from accelstudy.files.documents import Document, Part
 from accelstudy.files.outputs import ADVICE
 from accelstudy.leveling.angles import angles_of
 from accelstudy.pages.result import Result
@@ -28,6 +28,53 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
 Array = NDArray[np.float64]
+
+
+class AngleAdvice(Part):
+    """Roll, or pitch.
+
+    Attributes
+    ----------
+    angle : which of them
+    next_rad : that of the position to take next
+    rms_rad : error that is left; null as long as it is unknown
+    wanted_rad : accuracy that is wanted
+    """
+
+    angle: Literal["roll", "pitch"]
+    next_rad: float
+    rms_rad: float | None
+    wanted_rad: float
+
+
+class AdviceDocument(Document):
+    """What to do next in a session; `save` of `accelstudy.advise` writes it.
+
+    Attributes
+    ----------
+    campaign : name of the session
+    state : whether it is enough, or as that of the calibration so far
+    verdict : the last line of the advice
+    advice : all lines
+    positions : numbers of the positions so far
+    in_conflict : numbers of those that contradict the others
+    undetermined : parameters that are not determined yet
+    to_go : positions that are still needed; null if unknown
+    tilt : of roll and of pitch
+    command : that calibrates the session; empty unless it is enough
+    """
+
+    file = "advice.json"
+    campaign: str
+    state: Literal["enough", "not yet", "rejected", "implausible"]
+    verdict: str
+    advice: list[str]
+    positions: list[int]
+    in_conflict: list[int]
+    undetermined: list[str]
+    to_go: int | None
+    tilt: list[AngleAdvice]
+    command: str
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -100,10 +147,10 @@ class Advice(Result):
         """The advice, most important last."""
         return wording.advice_lines(self)
 
-    @property
+    @cached_property
     def content(self) -> dict[str, Any]:
         """Content of advice.json, in SI."""
-        return {
+        return AdviceDocument.content({
             "campaign": self.name,
             "state": self.state,
             "verdict": self.verdict,
@@ -114,7 +161,7 @@ class Advice(Result):
             "to_go": self.to_go,
             "tilt": self.to_frame().reset_index().to_dict("records"),
             "command": self.command,
-        }
+        })  # fmt: skip
 
     def to_frame(self) -> pd.DataFrame:
         """Return roll and pitch: those of the next position, their rms error now, and as wanted."""
@@ -137,7 +184,7 @@ class Advice(Result):
 
     def write(self, folder: Path, place: Path) -> None:
         """Write advice.json."""
-        write_json(folder / ADVICE.marker, self.content)
+        AdviceDocument.write(folder, self.content)
 
     def tell(self, place: Path | None) -> None:
         """Print the advice, and what was odd in the table so far."""

@@ -7,7 +7,7 @@ from dataclasses import replace
 from functools import cached_property
 from math import inf
 from pathlib import Path
-from typing import Any
+from typing import Any, Literal
 
 import pandas as pd
 import pyarrow as pa
@@ -18,8 +18,8 @@ from accelstudy.basics.arguments import as_sequence, check_type, quantity, tidy
 from accelstudy.basics.errors import InputError, UnknownNameError
 from accelstudy.basics.units import MGON, InputQuantity, display_unit, to_display
 from accelstudy.basics.wording import plural
-from accelstudy.campaign.calibration.document import write_json
 from accelstudy.drawing.style import FULL
+from accelstudy.files.documents import Document, Part
 from accelstudy.files.outputs import SIMULATION
 from accelstudy.files.tables import write_table
 from accelstudy.pages.result import Result
@@ -37,6 +37,77 @@ GRID: dict[str, tuple[str, Callable[[str], Any]]] = {
     "approach": ("approaches", get_approach),
 }
 """Arguments that may be several: the key in a grid of a study, and the lookup of a name."""
+
+
+class OfCell(Part):
+    """A row of a set-up.
+
+    Attributes
+    ----------
+    cell : name of the set-up; absent if there is one
+    """
+
+    cell: str | None = None
+
+
+class SimulatedParameter(OfCell):
+    """A parameter over all calibrations of a set-up, in SI.
+
+    Attributes
+    ----------
+    name : name
+    truth : true value
+    bias : mean error
+    bias_error : standard error of the bias
+    sd : standard deviation
+    sd_error : standard error of the sd
+    unit : SI unit
+    """
+
+    name: str
+    truth: float
+    bias: float | None
+    bias_error: float | None
+    sd: float | None
+    sd_error: float | None
+    unit: str
+
+
+class SimulatedTilt(OfCell):
+    """Tilt error that a calibration leaves in roll or in pitch, up to 50 gon, in rad.
+
+    Attributes
+    ----------
+    angle : roll or pitch
+    rms : over all calibrations
+    rms_error : standard error of the rms
+    q95 : bound that 95 of 100 calibrations stay below
+    q95_error : standard error of this bound
+    """
+
+    angle: Literal["roll", "pitch"]
+    rms: float | None
+    rms_error: float | None
+    q95: float | None
+    q95_error: float | None
+
+
+class SimulationDocument(Document):
+    """Simulated calibrations; `save` of `accelstudy.simulate` writes it.
+
+    Attributes
+    ----------
+    state : incomplete if some calibrations did not converge
+    verdict : in words
+    parameters : parameters of each set-up
+    tilt : tilt errors of each set-up
+    """
+
+    file = "simulation.json"
+    state: Literal["converged", "incomplete"]
+    verdict: str
+    parameters: list[SimulatedParameter]
+    tilt: list[SimulatedTilt]
 
 
 class Simulation(Result):
@@ -113,7 +184,8 @@ class Simulation(Result):
         """State, verdict, and the rows of parameters and of tilt errors."""
         tables = {"parameters": self.parameters, "tilt": self.tilt}
         rows = {name: table.reset_index().to_dict("records") for name, table in tables.items()}
-        return {"state": self.state, "verdict": self.verdict, **rows}
+        found = {"state": self.state, "verdict": self.verdict, **rows}
+        return SimulationDocument.content(found)
 
     def to_frame(self) -> pd.DataFrame:
         """Return the parameters or, of several set-ups, the tilt errors."""
@@ -130,7 +202,7 @@ class Simulation(Result):
 
     def write(self, folder: Path, place: Path) -> None:
         """Write simulation.json and the tables of a study."""
-        write_json(folder / "simulation.json", self.content)
+        SimulationDocument.write(folder, self.content)
         for name, table in self.tables.items():
             provenance = {"config_hash": None, "seed": self._seed}
             write_table(folder / f"{name}.parquet", table, provenance)

@@ -13,14 +13,21 @@ import schemas
 from mkdocs.structure.files import File
 
 from accelstudy.campaign.calibration.file_format import CalibrationDocument
+from accelstudy.diagnosis.report.file_format import DiagnosisDocument
 from accelstudy.epochs.file_format import HistoryDocument
 from accelstudy.lots.file_format import LotDocument
+from accelstudy.planning.plan import PlanDocument
+from accelstudy.sequential.advice import AdviceDocument
+from accelstudy.study.result import SimulationDocument
 
 MODULES = {
     module.__name__: module
     for module in (catalogue, file_formats, gallery, help_texts, quotes, schemas)
 }
-DOCUMENTS = (CalibrationDocument, HistoryDocument, LotDocument)
+DOCUMENTS = (
+    *(CalibrationDocument, HistoryDocument, LotDocument, DiagnosisDocument),
+    *(PlanDocument, AdviceDocument, SimulationDocument),
+)
 """Files whose JSON Schema can be downloaded."""
 CALL = re.compile(r"^<!-- (\w+)\.(\w+)\((.*)\) -->$", re.MULTILINE)
 

@@ -3,13 +3,10 @@
 import json
 import math
 import re
-from pathlib import Path
 from pkgutil import resolve_name
 
-import yaml
 from markdown_text import code, page, plain, table
 
-REFERENCE = Path(__file__).parents[1] / "reference"
 HEADS = ("key", "type", "default", "meaning")
 PLAIN = {"number": "number", "integer": "integer", "string": "text", "boolean": "true or false"}
 ENDS = {
@@ -25,15 +22,11 @@ def keys(source, before=""):
 
     Parameters
     ----------
-    source : str, a YAML file beside the page, or a model of pydantic or a function that returns its
-        schema, as ``module:name``
+    source : str, a model of pydantic or a function that returns its schema, as ``module:name``
     before : str, what the headings begin with, so that no two of a page are alike
     """
-    if source.endswith(".yaml"):
-        schema = yaml.safe_load((REFERENCE / source).read_text(encoding="utf-8"))
-    else:
-        made = resolve_name(source)
-        schema = getattr(made, "model_json_schema", made)()
+    made = resolve_name(source)
+    schema = getattr(made, "model_json_schema", made)()
     known, places = schema.get("$defs", {}), {}
 
     def described(block, path):

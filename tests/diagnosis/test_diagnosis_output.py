@@ -11,7 +11,7 @@ import numpy as np
 import pandas as pd
 import pytest
 import yaml
-from diagnosis_helpers import SCHEMA, explanation, otherwise
+from diagnosis_helpers import explanation, otherwise
 from leveling_helpers import leveling_error
 from page_helpers import assert_sound, text_of
 from stand_ins import composed
@@ -30,6 +30,7 @@ from accelstudy.diagnosis.decision.statement import statement_of
 from accelstudy.diagnosis.decision.verdict import Finding, Reason
 from accelstudy.diagnosis.held_out import Gap
 from accelstudy.diagnosis.pipeline import decide, diagnose
+from accelstudy.diagnosis.report.file_format import DiagnosisDocument
 from accelstudy.diagnosis.report.output import Diagnosis
 from accelstudy.diagnosis.report.words import render, verdict_lines
 from accelstudy.diagnosis.result import CampaignDiagnosis
@@ -112,7 +113,7 @@ def test_every_verdict_is_written_and_told(written, case):
     one = written(case)
     content, page, out = one.content, one.page, one.folder
     assert content["verdict"] == ("named" if case == "gravity" else case)
-    assert [error.message for error in SCHEMA.iter_errors(content)] == []
+    assert DiagnosisDocument.content(content) == content
     assert HEADLINES[case] in one.diagnosed.verdict
     assert HEADLINES[case] in text_of(page)
     drawn = {path.stem for path in (out / "figures").glob("*.svg")}
@@ -141,9 +142,9 @@ def write_diagnosis(diagnosis, folder):
 
 
 def told(diagnosis, folder):
-    """The content of diagnosis.json, which fits its schema, and the text of the page."""
+    """The content of diagnosis.json, which fits its model, and the text of the page."""
     content = write_diagnosis(diagnosis, folder)
-    assert [error.message for error in SCHEMA.iter_errors(content)] == []
+    assert DiagnosisDocument.content(content) == content
     page = (folder / "report.html").read_text(encoding="utf-8")
     assert_sound(page)
     return content, text_of(page)

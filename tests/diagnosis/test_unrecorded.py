@@ -9,7 +9,7 @@ from usual import NINE, G
 
 from accelstudy.campaign.session import Campaign
 from accelstudy.diagnosis.pipeline import diagnose
-from accelstudy.diagnosis.report.document import diagnosis_document
+from accelstudy.diagnosis.report.output import Diagnosis
 from accelstudy.diagnosis.report.words import verdict_lines
 
 CANNOT = (
@@ -65,7 +65,7 @@ def test_where_it_may_be_slow_noise_as_well_nothing_is_learned():
     assert "adequate" not in said
     assert "temperature at the sensor" in said
     assert "time of each hold" not in said
-    assert CANNOT in json.dumps(diagnosis_document(found))
+    assert CANNOT in json.dumps(Diagnosis(found).content)
     without_time = diagnose(session(wandering, seed=2, size=2.0, time=None), NINE)
     assert "time of each hold" in " ".join(verdict_lines(without_time))
 

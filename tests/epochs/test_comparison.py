@@ -11,9 +11,9 @@ from session_helpers import SENSOR, document, write_document
 from accelstudy.basics.errors import InputError
 from accelstudy.basics.units import GON
 from accelstudy.basics.units import STANDARD_GRAVITY as G
-from accelstudy.campaign.calibration.document import json_text
 from accelstudy.campaign.calibration.sensor_calibration import calibration_of
 from accelstudy.epochs.history import History
+from accelstudy.files.documents import json_text
 from accelstudy.leveling.angles import angles_of, wrap_angle
 from accelstudy.leveling.error import cap_forces
 

@@ -3,9 +3,6 @@
 from dataclasses import replace
 
 import numpy as np
-import yaml
-from jsonschema import Draft202012Validator
-from places import ROOT
 from scipy.stats import binom
 from usual import NINE, ROBOT, G
 
@@ -27,10 +24,6 @@ FULL = {
 }
 """A campaign with all columns, in which no effect of the catalogue hides behind another, but a
 thermal curve behind a thermal bias: there are two temperatures."""
-
-SCHEMA = Draft202012Validator(
-    yaml.safe_load((ROOT / "docs/reference/diagnosis.schema.yaml").read_text(encoding="utf-8"))
-)
 
 
 def campaign(seed=1, **keys):

@@ -1,7 +1,7 @@
 """Calibrations of one simulated sensor, as `calibration.json` has them."""
 
 import accelstudy as acs
-from accelstudy.campaign.calibration.document import json_text
+from accelstudy.files.documents import json_text
 
 SENSOR = ("bias: 0.1, 0.05, -0.1", "scale: 0.002, -0.001, 0.003",
           "nonorthogonality: 0.003, -0.002, 0.001")  # fmt: skip

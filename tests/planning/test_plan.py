@@ -7,6 +7,7 @@ import re
 from dataclasses import replace
 
 import numpy as np
+import pandas as pd
 import pytest
 import yaml
 from calling import call, refusal, succeed
@@ -20,12 +21,12 @@ from accelstudy.basics.units import GON, MGON, angles_in
 from accelstudy.data_sheets import DataSheet, data_sheet_names, get_data_sheet, sheet_of_sigma
 from accelstudy.design.continuous import continuous_optimum
 from accelstudy.design.spaces import Attitudes
-from accelstudy.files.tables import read_origin, read_table
 from accelstudy.leveling.error import cap_forces
 from accelstudy.pages import render_lines
 from accelstudy.planning import candidates as known
 from accelstudy.planning.answer import CalibrationKind, answer
 from accelstudy.planning.candidates import candidates, information_of, tilt_of
+from accelstudy.planning.plan import PlanDocument
 from accelstudy.planning.question import BY_HAND, ROBOT, Question
 from accelstudy.planning.reasons import errors_in_use, limits, spoilers
 from accelstudy.planning.simulated import cell_of
@@ -417,12 +418,13 @@ def test_the_command_writes_what_it_says(tmp_path):
     result = succeed(*asked, out, "--angle-unit", "deg")
     assert result.stdout.startswith("Measure ")
     names = {path.name for path in out.iterdir()}
-    assert names == {"plan.parquet", "positions.yaml", "plan.svg", "plan.png"}
-    table = read_table(out / "plan.parquet")
+    assert names == {"plan.json", "positions.yaml", "plan.svg", "plan.png"}
+    plan = PlanDocument.read(out).model_dump()
+    table = pd.DataFrame(plan["calibrations"])
     top = table[table["rank"] == 1].iloc[0]
     assert top["roll_rms_simulated_mgon"] <= 20
     assert (table["roll_rms_mgon"] <= 20.5).all()
-    assert read_origin(out / "plan.parquet")["seed"] == 1
+    assert plan["seed"] == 1
     assert get_scheme(str(out / "positions.yaml")).n_positions == top["n_positions"]
     again = succeed(*asked, out, "--quiet")
     assert len(again.stdout.splitlines()) < 10

@@ -2,9 +2,6 @@
 
 from __future__ import annotations
 
-import json
-from dataclasses import fields, is_dataclass
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -12,9 +9,9 @@ import pandas as pd
 
 from accelstudy.basics.units import MGON, recorded_unit, to_recorded
 from accelstudy.campaign.calibration.assessment import Assessment
+from accelstudy.campaign.calibration.file_format import CalibrationDocument
 from accelstudy.campaign.calibration.sensor_calibration import FORCES
 from accelstudy.campaign.calibration.wording import verdict_lines
-from accelstudy.files.outputs import whole_file
 from accelstudy.leveling.error import MAX_TILT_GON
 from accelstudy.sensors.frames import FRD
 
@@ -35,7 +32,6 @@ def calibration_document(assessment: Assessment) -> dict[str, Any]:
         **dict(zip(FORCES, fit.corrected.T, strict=True)),
     }
     content = {
-        "schema_version": 1,
         "campaign": campaign.name,
         "sensor": campaign.sensor,
         "date": campaign.date,
@@ -96,7 +92,7 @@ def calibration_document(assessment: Assessment) -> dict[str, Any]:
         "warnings": campaign.warnings,
         "quality": _quality(assessment),
     }
-    return dict(json_content(content))
+    return CalibrationDocument.content(content)
 
 
 def _quality(assessment: Assessment) -> dict[str, Any]:
@@ -184,29 +180,3 @@ def assessed_positions(assessment: Assessment) -> pd.DataFrame:
     suspects = {s.position for s in assessment.suspects}
     table["suspect"] = [i in suspects for i in range(len(table))]
     return table
-
-
-def json_content(content: Any) -> Any:
-    """Content for JSON: records are objects, arrays are lists, what is no finite number is None."""
-    if is_dataclass(content):
-        content = {part.name: getattr(content, part.name) for part in fields(content)}
-    elif hasattr(content, "_asdict"):
-        content = content._asdict()
-    if isinstance(content, dict):
-        return {key: json_content(value) for key, value in content.items()}
-    if isinstance(content, np.ndarray):
-        return json_content(content.tolist())
-    if isinstance(content, (list, tuple)):
-        return [json_content(value) for value in content]
-    return None if isinstance(content, float) and not np.isfinite(content) else content
-
-
-def json_text(content: Any) -> str:
-    """JSON for a file; what is no finite number is null, or the file could not be read again."""
-    return json.dumps(json_content(content), indent=2, ensure_ascii=False, allow_nan=False) + "\n"
-
-
-def write_json(path: str | Path, content: Any) -> None:
-    """Write a JSON file, whole or not at all."""
-    with whole_file(path) as part:
-        part.write_text(json_text(content), encoding="utf-8")

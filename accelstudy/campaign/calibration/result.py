@@ -20,16 +20,13 @@ from accelstudy.basics.suggestions import HERE
 from accelstudy.basics.units import GON, InputQuantity
 from accelstudy.campaign.calibration import export, wording
 from accelstudy.campaign.calibration.assessment import Assessment, tilt_left
-from accelstudy.campaign.calibration.document import (
-    assessed_positions,
-    calibration_document,
-    write_json,
-)
+from accelstudy.campaign.calibration.document import assessed_positions, calibration_document
 from accelstudy.campaign.calibration.figures import (
     correlation_figure,
     draw_residuals,
     residual_figure,
 )
+from accelstudy.campaign.calibration.file_format import CalibrationDocument
 from accelstudy.campaign.calibration.fit import CampaignFit
 from accelstudy.campaign.calibration.sensor_calibration import SensorCalibration, calibration_of
 from accelstudy.drawing.saving import save_all
@@ -206,7 +203,7 @@ class Calibration(Result):
         """
         if self.fit is not None:
             self._write_page(self.fit, folder, place)
-        write_json(folder / "calibration.json", self.content)
+        CalibrationDocument.write(folder, self.content)
 
     def _write_page(self, fit: CampaignFit, folder: Path, place: Path) -> None:
         """Write positions.parquet, figures/ and report.html."""

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
-from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, cast
 
@@ -23,7 +22,6 @@ from accelstudy.campaign.importing.recording import Recording
 from accelstudy.campaign.importing.settings import ImportSettings
 from accelstudy.campaign.importing.windows import usual_window
 from accelstudy.campaign.session import Campaign
-from accelstudy.pages import render_lines
 from accelstudy.sensors.conversion import Conversion
 
 if TYPE_CHECKING:
@@ -42,7 +40,6 @@ MEANS = ("n_samples", *SDS, "temperature", "vibration", *ANGLES)
 _YEARS = 1e8  # s; no session lasts for years, so later times count from 1970
 MIN_ROUNDING_RATIO = 0.1
 """Sigma of rounding over that of noise, from which on the resolution is told and kept."""
-_LINES = partial(render_lines, "campaign/importing/logs.txt.j2")
 
 
 def import_log(
@@ -302,6 +299,12 @@ def _layout_of(settings: ImportSettings, log: Log) -> LogLayout:
 # --- What is said of it --------------------------------------------------------------------------
 
 
+def _lines(*given: Any, **more: Any) -> list[str]:
+    from accelstudy.pages import render_lines  # not needed where nothing is said
+
+    return render_lines("campaign/importing/logs.txt.j2", *given, **more)
+
+
 def _notes(
     holds: Holds, settings: ImportSettings, offset: bool, reference: str, rounded: bool
 ) -> list[str]:
@@ -309,7 +312,7 @@ def _notes(
     log = holds.log.first
     names = [name if log.source.named else f"column {name}" for name in log.source.names]
     time = holds.log.time[holds.windows.centred]
-    return _LINES(
+    return _lines(
         "notes",
         holds,
         settings,
@@ -331,7 +334,7 @@ def _warnings(holds: Holds, gravity: float) -> list[str]:
     if noise.across > MAX_ACROSS_RATIO * noise.accuracy.allan:
         turned = f"{to_display(noise.across / gravity, 'rad'):.0f} {display_unit('rad')}"
     unknown = {name: holds.table[name].isna() for name in holds.log.conditions}
-    return _LINES(
+    return _lines(
         "warnings",
         holds,
         holds.log,

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import re
-from dataclasses import replace
+from collections.abc import Mapping
+from dataclasses import asdict, replace
 from typing import Any
 
 import numpy as np
@@ -15,27 +16,26 @@ from accelstudy.basics import plugins
 from accelstudy.basics.names import MAX_NAME_BYTES
 from accelstudy.basics.units import GON, MGON
 from accelstudy.campaign.calibration.assessment import Assessment
-from accelstudy.campaign.calibration.document import (
-    calibration_document,
-    json_content,
-)
+from accelstudy.campaign.calibration.document import calibration_document
 from accelstudy.campaign.calibration.fit import CampaignFit, campaign_estimability
 from accelstudy.diagnosis.consequences import TiltErrors
 from accelstudy.diagnosis.decision.statement import Part
+from accelstudy.diagnosis.report.file_format import DiagnosisDocument
 from accelstudy.diagnosis.report.words import clauses, warnings
-from accelstudy.diagnosis.result import CampaignDiagnosis, NamedCause
+from accelstudy.diagnosis.result import CampaignDiagnosis
 from accelstudy.diagnosis.rules import RULES
 from accelstudy.diagnosis.shape import TARGETS, LearnedShape
 from accelstudy.sensors.frames import FRD
 from accelstudy.sensors.models import MODELS, composition_name
 
 
-def diagnosis_document(diagnosis: CampaignDiagnosis) -> dict[str, Any]:
-    """Describe a diagnosis; numbers are in SI unless their key names another unit."""
+def diagnosis_document(
+    diagnosis: CampaignDiagnosis, calibration: Mapping[str, Any]
+) -> dict[str, Any]:
+    """Describe a diagnosis and its calibration; in SI but for keys that name another unit."""
     d, screening = diagnosis, diagnosis.detection
     test = d.global_test
     content = {
-        "schema_version": 1,
         "campaign": d.campaign.name,
         "approach": d.approach.name,
         "model": d.model.name,
@@ -52,7 +52,7 @@ def diagnosis_document(diagnosis: CampaignDiagnosis) -> dict[str, Any]:
         "noise": {
             "sigma_mps2": d.sigma_position,
             "sigma_source": "a-priori" if d.noise.trusted else "residuals",
-            "tests": [_some(t, "name", "statistic", "p_value", "remark") for t in d.noise_tests],
+            "tests": d.noise_tests,
         },
         "screening": {
             "p_value": screening.p_value,
@@ -60,9 +60,9 @@ def diagnosis_document(diagnosis: CampaignDiagnosis) -> dict[str, Any]:
             "candidates": [*screening.densities],
         },
         "posterior": d.probabilities,
-        "credible_set": [_some(one, "names", "classes", "posterior") for one in d.credible_set],
+        "credible_set": d.credible_set,
         "certain": [_certain(part, d) for part in d.certain],
-        "effects": [effect_document(named) for named in d.effects],
+        "effects": d.effects,
         "suspects": [{"position": label, "p_value": p} for label, p in d.suspects.items()],
         "shape": None if d.shape is None else shape_document(d.shape),
         "like": d.like,
@@ -83,14 +83,10 @@ def diagnosis_document(diagnosis: CampaignDiagnosis) -> dict[str, Any]:
         "redundancy": d.frame.residuals.redundancy,
         "n_positions": d.campaign.n_positions,
         "warnings": d.campaign.warnings,
-        "rules": RULES,
+        "rules": asdict(RULES),
+        "calibration": calibration,
     }
-    return dict(json_content(content))
-
-
-def _some(record: object, *names: str) -> dict[str, Any]:
-    """Some attributes of a record; None where there is no record."""
-    return {name: getattr(record, name, None) for name in names}
+    return DiagnosisDocument.content(content)
 
 
 def shape_document(shape: LearnedShape) -> dict[str, Any]:
@@ -124,17 +120,11 @@ def _certain(part: Part, d: CampaignDiagnosis) -> dict[str, Any]:
     }
 
 
-def effect_document(named: NamedCause) -> dict[str, Any]:
-    """Describe an effect, a noise effect or a gross error that was found."""
-    optional, content = ("position", "settings"), json_content(named)
-    return {k: v for k, v in content.items() if k not in optional or v not in (None, [])}
-
-
 def _gap(d: CampaignDiagnosis) -> dict[str, Any]:
     gap, held, tilt = d.gap, d.gap.held_out, d.leveling
     return {
         "sigma0_squared": {"before": gap.before, "after": gap.after},
-        "held_out_mse": _some(held, "before", "after", "floor"),
+        "held_out_mse": held or dict.fromkeys(("before", "after", "floor")),
         "held_out_z": held and held.z,
         "held_out_positions": d.campaign.positions[list(held.held) if held else []].tolist(),
         "leveling_rms_mgon": dict.fromkeys(TiltErrors._fields)

@@ -15,11 +15,12 @@ from numpy.linalg import LinAlgError
 from accelstudy.basics import suggestions
 from accelstudy.basics.errors import InputError
 from accelstudy.basics.progress import say, show, stage, warn
-from accelstudy.campaign.calibration.document import write_json
+from accelstudy.campaign.calibration.file_format import CalibrationDocument
 from accelstudy.campaign.calibration.result import Calibration
 from accelstudy.campaign.calibration.sensor_calibration import unknown
 from accelstudy.diagnosis.report import document, words
 from accelstudy.diagnosis.report.figures import diagnosis_figures, draw_explanations
+from accelstudy.diagnosis.report.file_format import DiagnosisDocument
 from accelstudy.diagnosis.result import MISSING, CampaignDiagnosis
 from accelstudy.diagnosis.rules import RULES
 from accelstudy.drawing.saving import save_all
@@ -54,7 +55,7 @@ class Diagnosis(Result):
         file: dict[str, Any] = {"file": None, "reason": made}
         if not isinstance(made, str):
             file = {"file": "calibration.json", "mended": made["mended"]}
-        return document.diagnosis_document(self.result) | {"calibration": file}
+        return document.diagnosis_document(self.result, file)
 
     @cached_property
     def _calibration(self) -> dict[str, Any] | str:
@@ -104,7 +105,7 @@ class Diagnosis(Result):
             positions = document.positions_table(d)
             write_table(folder / "positions.parquet", positions)
             if made is not None:
-                write_json(folder / "calibration.json", made)
+                CalibrationDocument.write(folder, made)
             with whole_file(folder / "model.yaml") as path:
                 text = yaml.safe_dump(document.model_file(d), sort_keys=False, allow_unicode=True)
                 path.write_text(text, encoding="utf-8")
@@ -122,7 +123,7 @@ class Diagnosis(Result):
                 missing=MISSING,
                 next_steps=next_steps(d, made, self.source, place),
             )
-            write_json(folder / "diagnosis.json", self.content)
+            DiagnosisDocument.write(folder, self.content)
 
     def tell(self, place: Path) -> None:
         """Print the verdict and what is said with it."""
