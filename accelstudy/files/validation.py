@@ -140,7 +140,7 @@ WORDS = {
     "literal_error": "must be {expected}",
     "string_pattern_mismatch": "must match {pattern}",
     "invalid_key": "a key must be a text",
-    **dict.fromkeys(("model_type", "dict_type", "dataclass_type"), _KEYS),
+    **dict.fromkeys(("model_type", "model_attributes_type", "dict_type"), _KEYS),
 }
 """What would be right, by the type of pydantic's error; two types have a text of their own."""
 
