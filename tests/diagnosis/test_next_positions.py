@@ -29,7 +29,7 @@ def rivals():
     The noise makes that either predicts other things of what the other one says.
     """
     model = compose("quadratic", (*(e.spec for e in NINE.effects), "quadratic_scale"))
-    directions = shuffled("mclaren-24")
+    directions = shuffled("fibonacci-16")
     ideal = session(model, np.append(np.zeros(9), QUADRATIC), directions, G)
     observed = ideal.draw(Noise(sigma_force=SIGMA), 1, np.random.default_rng(2))
     frame = SessionFit.of(solve(NINE, GRAVITY, replace(observed, angles=None)))

@@ -19,7 +19,7 @@ from accelstudy.lots.mixture import (
     PRIOR_ODD,
     Mixture,
 )
-from accelstudy.lots.passes import LEVEL, Pass
+from accelstudy.lots.passes import LEVEL, MIN_CERTAIN, Pass
 from accelstudy.lots.sizes import SCATTERS, Derivatives, TypeSizes, most_likely
 from accelstudy.sensors.models import get_model
 
@@ -261,6 +261,16 @@ def test_names_that_exclude_each_other_are_reported_as_one_set():
     said = [replace(each, pairs=both[0]) for each in one.evidence]
     found = replace(one, evidence=tuple(said)).found
     assert [{*effect.names} for effect in found] == [{NAMES[2]}, {*NAMES[:2]}]
+
+
+def test_names_that_may_be_missing_together_are_reported_apart():
+    """Each sensor shows either of two effects, and both together a little better."""
+    both = {NAMES[:2]: 12.3, NAMES[1:]: 12.0, NAMES[::2]: 12.0}
+    one = weighed(np.array([[12.0, 12.0, 0.0]] * 12), np.random.default_rng(7))
+    one = replace(one, evidence=tuple(replace(each, pairs=both) for each in one.evidence))
+    assert max(one.given.values()) < MIN_CERTAIN  # while one of the two is sure to be missing
+    assert one.mixture.of_any(NAMES[:2]) > MIN_CERTAIN * one.wrong
+    assert [effect.names for effect in one.found] == [(NAMES[0],), (NAMES[1],)]
 
 
 def test_names_that_no_campaign_tells_apart_are_one_class():
