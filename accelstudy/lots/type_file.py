@@ -124,14 +124,15 @@ def write_type(lot: Lot, folder: Path) -> bool:
         for name, stays in zip(model.parameter_names, model.stays, strict=True)
         if name in wanted
     }
+    sheet = {**file_key(), **_sheet(lot, parameters).content}
     content = TypeFile.content({
-        **file_key(),
-        **_sheet(lot, parameters).content,
+        **sheet,
         "models": {"type": [effect.spec for effect in lasting]},
         "sensors": sensors,
         "parameters": parameters,
     })  # fmt: skip
     with whole_file(folder / TYPE_FILE) as path:
+        content = {name: content[name] for name in (*sheet, *content)}  # name and title first
         text = yaml.safe_dump(content, sort_keys=False, allow_unicode=True, width=96)
         path.write_text(text, encoding="utf-8")
     return True
