@@ -54,7 +54,7 @@ WRONG = [
     *([], [[]], ["x"] * 99, [1] * 4, {"k": {}}, {3: -1}),
 ]
 MARKS = (
-    r"constrained|function|nullable|union|should|required|nable|\.(str|int|float|list|dict|bool)\b"
+    r"constrained|function-|nullable|union|should|required|nable|\.(str|int|float|list|dict|bool)\b"
 )
 """What only pydantic says, such as the key columns.fx.constrained-int."""
 

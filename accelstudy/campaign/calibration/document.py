@@ -87,7 +87,12 @@ def calibration_document(assessment: Assessment) -> dict[str, Any]:
         "mended": None,
         "excluded": campaign.exclusions,
         "range_mps2": campaign.full_range,
-        "ranges": {k: [v.min(), v.max()] for k, v in ranged.items() if v is not None},
+        # Forces that the calibration cannot correct, as of exchanged axes, have no range.
+        "ranges": {
+            k: [v.min(), v.max()]
+            for k, v in ranged.items()
+            if v is not None and np.isfinite(v).all()
+        },
         "log": campaign.log and campaign.log.model_dump(exclude_none=True, by_alias=True),
         "warnings": campaign.warnings,
         "quality": _quality(assessment),
