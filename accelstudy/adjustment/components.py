@@ -116,7 +116,10 @@ def _estimate(solution: Solution, groups: Array, factors: Array) -> VarianceComp
     prior = rows.T @ rows
 
     for _ in range(MAX_STEPS):
-        inverse = np.linalg.inv(np.tensordot(factors, m, 1))
+        try:
+            inverse = np.linalg.inv(np.tensordot(factors, m, 1))
+        except np.linalg.LinAlgError:  # factors beyond all bounds, of numbers that are no session
+            return None
         weighted = inverse @ a
         g = np.linalg.inv(_normal(a, weighted) + prior)
         # W w, by position; the row of observed gravity does not count in the components.

@@ -104,3 +104,11 @@ def test_a_component_that_is_not_there_goes_to_zero_and_not_below():
 def test_there_are_no_components_without_two_groups():
     assert variance_components(NINE, GRAVITY, draw(1)) is None
     assert variance_components(NINE, ROBOT, draw(1, noise=Noise(sigma_angle=0.0))) is None
+
+
+def test_numbers_that_are_no_session_have_no_components():
+    """Readings in whole units of gravity, whose factors would grow beyond all bounds."""
+    observed = session(NINE, np.zeros(9), get_scheme("random-13-7").directions, 9.80665)
+    observed = observed.observations(Noise())
+    coarse = replace(observed, forces=np.round(observed.forces / 9.80665) * 9.80665)
+    assert variance_components(NINE, ROBOT, coarse) is None
