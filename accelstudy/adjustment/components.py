@@ -118,7 +118,7 @@ def _estimate(solution: Solution, groups: Array, factors: Array) -> VarianceComp
     for _ in range(MAX_STEPS):
         try:
             inverse = np.linalg.inv(np.tensordot(factors, m, 1))
-        except np.linalg.LinAlgError:  # factors beyond all bounds, of numbers that are no session
+        except np.linalg.LinAlgError:  # factors without bounds, of numbers that are no session
             return None
         weighted = inverse @ a
         g = np.linalg.inv(_normal(a, weighted) + prior)
@@ -141,14 +141,16 @@ def _estimate(solution: Solution, groups: Array, factors: Array) -> VarianceComp
         size = np.sqrt(np.diag(s))
         if not np.all(size > 0) or np.linalg.cond(s / np.outer(size, size)) > 1e10:
             return None
-        covariance = 2 * np.linalg.inv(s)
+        variances = np.diag(2 * np.linalg.inv(s))
+        if not np.all(variances > 0):  # likewise
+            return None
         target = np.linalg.solve(s, share - np.einsum("iuv,vu->i", gt, g @ prior))
         if np.any(target <= 0):
             # Förstner's step alone would creep towards zero where that is the solution.
             target = factors * np.minimum(share / trace, np.where(target <= 0, 0.5, np.inf))
         step = target - factors
         factors = target
-        sigma = np.sqrt(np.diag(covariance))
+        sigma = np.sqrt(variances)
         if np.all(np.abs(step) <= STEP_TOLERANCE * sigma):
             return VarianceComponents(factors, sigma, True)
     return VarianceComponents(factors, sigma, False)
