@@ -58,7 +58,8 @@ class Mixture:
     Attributes
     ----------
     odds : mapping of each effect to (n,) array, log odds of the sensors against nothing
-    pairs : mapping of two effects to (n,) array, log odds of both together
+    pairs : mapping of two effects to (n,) array, log odds of both together; −inf of a sensor for
+        which they were not weighed together
     prior : mapping of each effect to its prior probability; these sum to 1
     common : mapping of what has no name to log odds that it is the same in all sensors
     sizes : TypeSizes of effects; None if nothing is known of them
@@ -159,7 +160,8 @@ class Mixture:
             return np.zeros(len(self._anything))
         # Two that were not weighed together say no more than the weaker one.
         weaker = np.min([self.odds[name] for name in subset], axis=0)
-        return self.pairs.get(subset, np.asarray(weaker))
+        known = self.pairs.get(subset, np.float64(-np.inf))
+        return np.where(np.isneginf(known), weaker, known)
 
     def _contributions(self, names: Names, odds: Array) -> Array:
         """Log of what each of `_subsets`, and oddness, contributes, (s + 1, n, nodes ...).

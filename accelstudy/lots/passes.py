@@ -160,10 +160,6 @@ class Pass:
                 if len(names) == 2:
                     told = pairs.setdefault(names, np.full(len(self.evidence), -np.inf))
                     told[i] = max(log, told[i])
-        for names, told in pairs.items():
-            # Of a sensor without odds of both they are as where none has any (`Mixture`).
-            weaker = np.min([odds[name] for name in names], axis=0)
-            np.copyto(told, weaker, where=np.isneginf(told))
         # Names of one kind share its weight evenly.
         usual = {n: UNKNOWN if n.startswith(UNKNOWN) else EFFECT for n in self.classes}
         kinds = {name: name if name in WEIGHTS else kind for name, kind in usual.items()}
