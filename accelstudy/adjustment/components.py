@@ -142,7 +142,7 @@ def _estimate(solution: Solution, groups: Array, factors: Array) -> VarianceComp
         if not np.all(size > 0) or np.linalg.cond(s / np.outer(size, size)) > 1e10:
             return None
         variances = np.diag(2 * np.linalg.inv(s))
-        if not np.all(variances > 0):  # likewise
+        if not np.all(variances > 0):  # the rounding error of such factors
             return None
         target = np.linalg.solve(s, share - np.einsum("iuv,vu->i", gt, g @ prior))
         if np.any(target <= 0):

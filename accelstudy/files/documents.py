@@ -107,5 +107,5 @@ def json_content(content: Any) -> Any:
 
 
 def json_text(content: Mapping[str, Any]) -> str:
-    """JSON for a file; what is no finite number is null, or the file could not be read again."""
-    return json.dumps(json_content(content), indent=2, ensure_ascii=False, allow_nan=False) + "\n"
+    """JSON of a content for a file, as of `Document.content`: plain data, without NaN."""
+    return json.dumps(content, indent=2, ensure_ascii=False, allow_nan=False) + "\n"
