@@ -81,6 +81,12 @@ class Document(Part):
         return json_content(content)
 
     @classmethod
+    def of(cls, result: object) -> dict[str, Any]:
+        """Content of the file of a result: for each key its attribute of that name."""
+        keys = [key for key in cls.model_fields if key != "schema_version"]
+        return cls.content({key: getattr(result, key) for key in keys})
+
+    @classmethod
     def write(cls, folder: Path, content: Mapping[str, Any]) -> None:
         """Write the file into a folder, whole or not at all."""
         with whole_file(folder / cls.file) as part:
@@ -93,7 +99,7 @@ class Document(Part):
 
 
 def json_content(content: Any) -> Any:
-    """Content for JSON: arrays are lists, and what is no finite number is None.
+    """Content for JSON: arrays are lists, tables records; what is no finite number is None.
 
     Records stay as they are: the model of the document reads their attributes.
     """
@@ -101,6 +107,8 @@ def json_content(content: Any) -> Any:
         return {key: json_content(value) for key, value in content.items()}
     if isinstance(content, np.ndarray | np.generic):
         return json_content(content.tolist())
+    if hasattr(content, "reset_index"):  # a DataFrame; pandas is slow to import
+        return json_content(content.reset_index().to_dict("records"))
     if isinstance(content, list | tuple) and not hasattr(content, "_fields"):
         return [json_content(value) for value in content]
     return None if isinstance(content, float) and not np.isfinite(content) else content

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any, ClassVar
 from accelstudy.basics.arguments import path_of
 from accelstudy.basics.progress import say, show
 from accelstudy.drawing.style import FULL, MM, STYLE
+from accelstudy.files.documents import Document
 from accelstudy.files.outputs import OutputKind, new_file
 from accelstudy.pages.notebook import notebook_html
 
@@ -34,13 +35,15 @@ class Result(ABC):
     """Of the folder that is written; a result that is a file has none."""
     exit_status = 0
     """Of the command; where it is not 0, there is nothing to write."""
+    document: ClassVar[type[Document]]
+    """Of the JSON file that is written, whose keys are names of attributes."""
     size = FULL, 62.0
     """Width (inches) and height (mm) of the main figure."""
 
     @property
-    @abstractmethod
     def content(self) -> Mapping[str, Any]:
         """Content of the JSON file that `save` writes, or what it would say if there is none."""
+        return self.document.of(self)
 
     @property
     def state(self) -> str:
@@ -60,9 +63,9 @@ class Result(ABC):
     def draw(self, ax: Axes) -> None:
         """Draw the main figure into axes."""
 
-    @abstractmethod
     def write(self, folder: Path, place: Path) -> None:
         """Write all files into a folder that is there; the page names `place` as theirs."""
+        self.document.write(folder, self.content)
 
     def plot(self, ax: Axes | None = None) -> Axes:
         """Draw the main figure into given axes, or into new ones, and return them."""

@@ -4,8 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field
+from functools import cached_property
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Literal
+from typing import TYPE_CHECKING, Literal, Self
 
 from accelstudy.basics.errors import InputError
 from accelstudy.basics.progress import say, show
@@ -19,6 +20,7 @@ from accelstudy.planning import wording
 from accelstudy.planning.candidates import Candidate
 from accelstudy.planning.question import Question
 from accelstudy.planning.reasons import limits
+from accelstudy.planning.simulated import QUOTED
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -67,6 +69,27 @@ class PlannedCalibration(Part):
     pitch_rms_simulated_mgon: float
     both_rms_q95_simulated_mgon: float
 
+    @classmethod
+    def of(cls, question: Question, c: Candidate, rank: int) -> Self:
+        """Describe a candidate that was simulated."""
+        assert c.simulated is not None
+        left = {"rms": c.tilt.rms, "rms_simulated": c.simulated.rms}
+        return cls(
+            rank=rank,
+            equipment=c.equipment.name,
+            model=c.model.name,
+            n_parameters=c.model.n_parameters,
+            scheme=c.scheme.name,
+            n_positions=c.scheme.n_positions,
+            hold_s=c.hold,
+            sensor_sigma_mps2=c.sigma,
+            minutes=c.seconds / 60,
+            redundancy=c.redundancy,
+            limited_by=limits(question, c),
+            **{f"{a}_{k}_mgon": v[i] / MGON for k, v in left.items() for i, a in enumerate(ANGLES)},
+            both_rms_q95_simulated_mgon=c.simulated.quantile_of_both(QUOTED) / MGON,
+        )
+
 
 class PlanDocument(Document):
     """The cheapest calibrations for a tilt accuracy; `accelstudy plan --out` writes it.
@@ -99,7 +122,7 @@ class Plan(Result):
         simulated, by the time they take; empty if none does
     """
 
-    kind = PLAN
+    kind, document = PLAN, PlanDocument
     size = FULL, 95.0
 
     question: Question
@@ -138,22 +161,17 @@ class Plan(Result):
         """What to do, in one line."""
         return wording.part_lines("answer", self)[0]
 
-    @property
-    def content(self) -> dict[str, Any]:
-        """Content of plan.json: the cheapest calibrations."""
-        return PlanDocument.content({
-            "state": self.state,
-            "verdict": self.verdict,
-            "seed": self.seed,
-            "calibrations": self.to_frame().reset_index().to_dict("records"),
-        })  # fmt: skip
+    @cached_property
+    def calibrations(self) -> list[PlannedCalibration]:
+        """The cheapest calibrations that reach the accuracy, by rank."""
+        return [PlannedCalibration.of(self.question, c, i) for i, c in enumerate(self.ranked, 1)]
 
     def to_frame(self) -> pd.DataFrame:
         """Return the cheapest calibrations that reach the accuracy, by rank; angles are in mgon."""
         import pandas as pd  # slow to import, and not needed for what is printed
 
-        rows = [_row(self.question, candidate) for candidate in self.ranked]
-        return pd.DataFrame(rows, index=pd.RangeIndex(1, len(rows) + 1, name="rank"))
+        rows = [one.model_dump() for one in self.calibrations]
+        return pd.DataFrame(rows, columns=[*PlannedCalibration.model_fields]).set_index("rank")
 
     def draw(self, ax: Axes) -> None:
         """Draw the tilt error left over the time in the field."""
@@ -183,7 +201,7 @@ class Plan(Result):
             self.draw(figure.subplots())
         for name in ("plan.svg", "plan.png"):
             save(figure, folder / name, "Plan", DPI)
-        PlanDocument.write(folder, self.content)
+        super().write(folder, place)
 
     def tell(self, place: Path | None) -> None:
         """Print the answer, the table and the assumptions."""
@@ -201,25 +219,6 @@ class Plan(Result):
             say("--out FOLDER writes the positions, the table and the figure.")
         else:
             say(f"positions, table and figure: {place}")
-
-
-def _row(question: Question, c: Candidate) -> dict[str, Any]:
-    assert c.simulated is not None
-    left = {"rms": c.tilt.rms, "rms_simulated": c.simulated.rms}
-    return {
-        "equipment": c.equipment.name,
-        "model": c.model.name,
-        "n_parameters": c.model.n_parameters,
-        "scheme": c.scheme.name,
-        "n_positions": c.scheme.n_positions,
-        "hold_s": c.hold,
-        "sensor_sigma_mps2": c.sigma,
-        "minutes": c.seconds / 60,
-        "redundancy": c.redundancy,
-        "limited_by": limits(question, c),
-        **{f"{a}_{k}_mgon": v[i] / MGON for k, v in left.items() for i, a in enumerate(ANGLES)},
-        "both_rms_q95_simulated_mgon": c.simulated.quantile_of_both(0.95) / MGON,
-    }
 
 
 def most_accurate(question: Question, chosen: Sequence[Candidate]) -> Candidate | None:

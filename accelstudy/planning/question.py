@@ -19,6 +19,8 @@ HOLDS = (1.0, 2.0, 5.0, 10.0, 20.0, 30.0, 60.0, 120.0)
 """Durations of a hold that are tried, s."""
 USUAL_HOLD = 10.0
 """s, for a sensor of which only the noise of a position is known."""
+HOW = {"gravity": "by hand", "robot": "with a robot"}
+"""Equipment in words, by its name."""
 NONLINEAR = ("quadratic_scale", "cubic_scale")
 
 
@@ -40,7 +42,7 @@ class Equipment:
     @property
     def how(self) -> str:
         """The equipment in words."""
-        return "by hand" if self.name == "gravity" else "with a robot"
+        return HOW[self.name]
 
     def seconds(self, positions: int, hold: float) -> float:
         """Time in the field, s."""

@@ -10,16 +10,16 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from accelstudy.basics.units import angle_note, display_unit  # noqa: F401
+from accelstudy.basics.units import MGON, angle_note, display_unit  # noqa: F401
 from accelstudy.basics.wording import amount, quantity_text
 from accelstudy.pages import render_lines
 from accelstudy.planning import reasons
-from accelstudy.planning.candidates import Candidate, shortest  # noqa: F401
-from accelstudy.planning.question import Question
-from accelstudy.planning.simulated import QUOTED
+from accelstudy.planning.candidates import shortest  # noqa: F401
+from accelstudy.planning.question import HOW, Question
+from accelstudy.planning.simulated import QUOTED  # noqa: F401
 
 if TYPE_CHECKING:
-    from accelstudy.planning.plan import Plan
+    from accelstudy.planning.plan import Plan, PlannedCalibration
 
 SENTENCES = "planning/wording.txt.j2"
 HERE = sys.modules[__name__]
@@ -46,7 +46,7 @@ def table_lines(plan: Plan) -> list[str]:
         "", "equipment", "model", "scheme", "positions", "s each", "minutes",
         f"roll/{unit}", f"pitch/{unit}", f"both/{unit}", "limited by",
     ]  # fmt: skip
-    table = np.array([head, *(_row(plan, i, c) for i, c in enumerate(plan.ranked, 1))])
+    table = np.array([head, *map(_cells, plan.calibrations)])
     aligned = [
         (np.char.rjust if 4 <= i < 10 else np.char.ljust)(column, max(map(len, column)))
         for i, column in enumerate(table.T)
@@ -58,18 +58,10 @@ def table_lines(plan: Plan) -> list[str]:
     ]
 
 
-def _row(plan: Plan, rank: int, candidate: Candidate) -> list[str]:
-    left = candidate.simulated
-    assert left is not None
+def _cells(c: PlannedCalibration) -> list[str]:
+    tilt = c.roll_rms_simulated_mgon, c.pitch_rms_simulated_mgon, c.both_rms_q95_simulated_mgon
     return [
-        f"{rank}.",
-        candidate.equipment.how,
-        candidate.model.name,
-        candidate.scheme.name.partition("@")[0],
-        str(candidate.scheme.n_positions),
-        f"{candidate.hold:g}",
-        f"{candidate.seconds / 60:.1f}",
-        *(amount(rms, "rad") for rms in left.rms),
-        amount(left.quantile_of_both(QUOTED), "rad"),
-        reasons.limits(plan.question, candidate),
-    ]
+        f"{c.rank}.", HOW[c.equipment], c.model, c.scheme.partition("@")[0], str(c.n_positions),
+        f"{c.hold_s:g}", f"{c.minutes:.1f}", *(amount(mgon * MGON, "rad") for mgon in tilt),
+        c.limited_by,
+    ]  # fmt: skip

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Literal
+from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 import pandas as pd
@@ -85,10 +85,9 @@ class Advice(Result):
     ----------
     session : Campaign, so far
     model, approach, promise : by which it is judged
-    positions : (n,) int array, numbers of the positions, without those that the campaign leaves out
     p_last : float, of the last position by all others, adjusted for the number of positions, as in
         the report of a calibration; NaN where they cannot test it
-    suspects : tuple of int, numbers of positions that contradict the others; they are used
+    in_conflict : tuple of int, numbers of positions that contradict the others; they are used
     calibration_state : str, state of a calibration with these positions; empty if there is none yet
     undetermined : tuple of str, parameters that the positions do not determine yet
     sigma_seen : float or None, m/s², noise of a position by the residuals; None without redundancy
@@ -103,16 +102,14 @@ class Advice(Result):
     command : str, that calibrates the session if it is enough; else empty
     """
 
-    kind = ADVICE
+    kind, document = ADVICE, AdviceDocument
 
-    name: str
     session: Campaign
     model: SensorModel
     approach: Approach
     promise: Promise
-    positions: NDArray[np.int_]
     p_last: float
-    suspects: tuple[int, ...]
+    in_conflict: tuple[int, ...]
     calibration_state: str
     undetermined: tuple[str, ...]
     sigma_seen: float | None
@@ -126,10 +123,22 @@ class Advice(Result):
     command: str = ""
 
     @property
+    def campaign(self) -> str:
+        """Name of the session."""
+        return self.session.name
+
+    name = campaign
+
+    @property
+    def positions(self) -> NDArray[np.int_]:
+        """Numbers of the positions so far, (n,), without those that the campaign leaves out."""
+        return self.session.positions
+
+    @property
     def repeats(self) -> int | None:
         """Number of the last position, if it contradicts the others, so that it is taken again."""
         last = int(self.positions[-1]) if len(self.positions) else None
-        return last if last in self.suspects else None
+        return last if last in self.in_conflict else None
 
     @property
     def state(self) -> str:
@@ -140,37 +149,26 @@ class Advice(Result):
     @property
     def verdict(self) -> str:
         """How far it is to the accuracy that is wanted, in a sentence."""
-        return self.lines[-1]
+        return self.advice[-1]
 
     @cached_property
-    def lines(self) -> list[str]:
-        """The advice, most important last."""
+    def advice(self) -> list[str]:
+        """All lines of the advice, most important last."""
         return wording.advice_lines(self)
 
-    @cached_property
-    def content(self) -> dict[str, Any]:
-        """Content of advice.json, in SI."""
-        return AdviceDocument.content({
-            "campaign": self.name,
-            "state": self.state,
-            "verdict": self.verdict,
-            "advice": self.lines,
-            "positions": self.positions,
-            "in_conflict": self.suspects,
-            "undetermined": self.undetermined,
-            "to_go": self.to_go,
-            "tilt": self.to_frame().reset_index().to_dict("records"),
-            "command": self.command,
-        })  # fmt: skip
-
-    def to_frame(self) -> pd.DataFrame:
-        """Return roll and pitch: those of the next position, their rms error now, and as wanted."""
+    @property
+    def tilt(self) -> pd.DataFrame:
+        """Roll and pitch: those of the next position, their rms error now, and as wanted."""
         rows = {
             "next_rad": angles_of(-self.next),
             "rms_rad": np.nan if self.rms is None else self.rms,
             "wanted_rad": self.promise.accuracy,
         }
         return pd.DataFrame(rows, index=pd.Index(["roll", "pitch"], name="angle"))
+
+    def to_frame(self) -> pd.DataFrame:
+        """Return roll and pitch, as `tilt`."""
+        return self.tilt
 
     def draw(self, ax: Axes) -> None:
         """Draw roll and pitch of the positions so far, and of the next one."""
@@ -182,10 +180,6 @@ class Advice(Result):
         ax.set(xlabel=f"roll / {attitude_unit()}", ylabel=f"pitch / {attitude_unit()}")
         ax.legend()
 
-    def write(self, folder: Path, place: Path) -> None:
-        """Write advice.json."""
-        AdviceDocument.write(folder, self.content)
-
     def tell(self, place: Path | None) -> None:
         """Print the advice, and what was odd in the table so far."""
         for warning in self.session.warnings:
@@ -196,4 +190,4 @@ class Advice(Result):
         """Return the advice as text."""
         more = [f"calibrate: {self.command}"] if self.command else []
         heading = wording.heading(self)
-        return "\n".join([heading, *(f"  {line}" for line in (*self.lines, *more))])
+        return "\n".join([heading, *(f"  {line}" for line in (*self.advice, *more))])

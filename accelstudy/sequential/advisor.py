@@ -153,14 +153,12 @@ def advise(
     suspects = () if assessed is None else assessed.suspects
     seen, taken = _sigmas(known, campaign.sigma_force, trusted, noise.sigma_force)
     advice = Advice(
-        name=campaign.name,
         session=campaign,
         model=model,
         approach=approach,
         promise=promise,
-        positions=campaign.positions,
         p_last=np.nan if assessed is None else float(assessed.p_adjusted[-1]),
-        suspects=tuple(sorted(int(campaign.positions[s.position]) for s in suspects)),
+        in_conflict=tuple(sorted(int(campaign.positions[s.position]) for s in suspects)),
         calibration_state="" if assessed is None else assessed.state,
         undetermined=() if known.determined else _undetermined(campaign, model, approach, known),
         sigma_seen=seen,

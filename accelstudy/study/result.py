@@ -119,7 +119,7 @@ class Simulation(Result):
     cells : tuple of Cell, the set-ups
     """
 
-    kind = SIMULATION
+    kind, document = SIMULATION, SimulationDocument
 
     def __init__(self, statistics: Sequence[CellStatistics], seed: int) -> None:
         self.statistics, self._seed = statistics, seed
@@ -179,14 +179,6 @@ class Simulation(Result):
     def _converged(self) -> int:
         return sum(one.converged for one in self.statistics)
 
-    @property
-    def content(self) -> dict[str, Any]:
-        """State, verdict, and the rows of parameters and of tilt errors."""
-        tables = {"parameters": self.parameters, "tilt": self.tilt}
-        rows = {name: table.reset_index().to_dict("records") for name, table in tables.items()}
-        found = {"state": self.state, "verdict": self.verdict, **rows}
-        return SimulationDocument.content(found)
-
     def to_frame(self) -> pd.DataFrame:
         """Return the parameters or, of several set-ups, the tilt errors."""
         return self.parameters if len(self.cells) == 1 else self.tilt
@@ -202,7 +194,7 @@ class Simulation(Result):
 
     def write(self, folder: Path, place: Path) -> None:
         """Write simulation.json and the tables of a study."""
-        SimulationDocument.write(folder, self.content)
+        super().write(folder, place)
         for name, table in self.tables.items():
             provenance = {"config_hash": None, "seed": self._seed}
             write_table(folder / f"{name}.parquet", table, provenance)

@@ -201,7 +201,7 @@ def test_it_judges_as_the_calibration_does(begun, n, bumped):
     )
     np.testing.assert_allclose(advice.rms, calibrated.tilt.total, rtol=1e-12)
     suspects = [int(measured.positions[s.position]) for s in calibrated.suspects]
-    assert list(advice.suspects) == sorted(suspects)
+    assert list(advice.in_conflict) == sorted(suspects)
     assert advice.enough == (not bumped)
 
 
