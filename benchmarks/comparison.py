@@ -10,7 +10,6 @@ go into a page, if one is given. Missing data are downloaded.
 
 import json
 import sys
-from dataclasses import replace
 from importlib.metadata import version
 from pathlib import Path
 
@@ -31,8 +30,8 @@ FACES = {
     "x_p": (0, 90), "x_a": (0, -90), "y_p": (-90, 0), "y_a": (90, 0), "z_p": (180, 0), "z_a": (0, 0)
 }  # fmt: skip
 """Sections of imucal's data, and the roll and pitch that they should have, in degrees."""
-PLACED = np.radians(0.1)
-"""Sd of how well the faces were placed, as stated to the adjustment."""
+PLACED = 0.1 / 0.9 * 1e3
+"""mgon, sd of how well the faces were placed (0.1°), as stated to the adjustment."""
 RATE, G = 204.8, 9.81
 AXES = ["acc_x", "acc_y", "acc_z"]
 AUTHORS = {
@@ -56,7 +55,8 @@ def campaigns(folder):
     found, _ = import_log(public_file("ferraris", folder), import_settings("ferraris"))
     log, noted = sections(folder)
     means = np.array([log[AXES][slice(*noted[name])].mean() for name in FACES])
-    six = Campaign("six", np.arange(6) + 1, means, G, sigma_force=found.sigma_force)
+    header = {"name": "six", "gravity": {"value_mps2": G}}
+    six = Campaign.of(header, forces=means).with_sigma(found.sigma_force)
     return found, six
 
 
@@ -109,7 +109,8 @@ def ferraris(folder):
     """Tables of the parameters, and of the time, of the data of imucal."""
     found, six = campaigns(folder)
     roll_pitch = np.radians(list(FACES.values()))
-    placed = replace(six, angles=roll_pitch, sigma_angle=PLACED, yaw=np.zeros(6))
+    placed = six.with_header(robot={"angle_sigma_mgon": PLACED})
+    placed = placed.with_arrays(angles=roll_pitch, yaw=np.zeros(6))
     twelve = "bias-scale-nonorthogonality-crossaxis"
     works = {
         "imucal": by_imucal(folder),

@@ -15,13 +15,13 @@ import yaml
 from numpy.typing import NDArray
 
 from accelstudy.basics.errors import InputError, brief
-from accelstudy.basics.units import MGON
 from accelstudy.basics.wording import one_line
+from accelstudy.campaign.columns import COLUMNS, KEYS, Columns, table_of
 from accelstudy.campaign.gross_errors.recognition import check_plausible
-from accelstudy.campaign.header import COLUMNS, HEADER, KNOWN, TABLE, Columns, Header
+from accelstudy.campaign.header import HEADER, TABLE, Header
 from accelstudy.campaign.session import Campaign
 from accelstudy.files.outputs import whole_file
-from accelstudy.files.reading import overlay, read_layer, read_text
+from accelstudy.files.reading import read_layer, read_text
 from accelstudy.files.validation import validate
 
 Array = NDArray[np.float64]
@@ -30,25 +30,9 @@ Table = Mapping[str, Sequence[Any]]
 
 MOST_NAMED = 5
 """Largest number of unknown columns with a warning each."""
-_OF_HEADER = {
-    "name": "name",
-    "sensor": "sensor",
-    "date": "date",
-    "unit": "unit",
-    "gravity": "gravity.value_mps2",
-    "sigma_gravity": "gravity.sigma_mps2",
-    "sigma_force": "sensor_noise.sigma_mps2",
-    "sigma_dof": "sensor_noise.degrees_of_freedom",
-    "full_range": "range_mps2",
-    "reference": "reference",
-    "log": "log",
-}
-"""Attributes of a campaign that are keys of its header."""
 
 
-def read_campaign(
-    folder: str | Path, given: Mapping[str, Any] | None = None, *, plausible: bool = True
-) -> Campaign:
+def read_campaign(folder: str | Path, *, plausible: bool = True, running: bool = False) -> Campaign:
     """Read a campaign folder: `campaign.yaml` and `positions.csv`.
 
     With ``unit: g`` forces are multiples of standard gravity, 9.80665 m/s². This unit is the same
@@ -63,11 +47,12 @@ def read_campaign(
     Parameters
     ----------
     folder : path
-    given : mapping, optional
-        Overlays the header key by key.
     plausible : bool
         Whether to refuse forces that are not as large as gravity, and angles that fit them better
         in another unit. False is for callers that look for such errors themselves.
+    running : bool
+        Whether the session still runs: there may be no position yet, and a last line without an
+        end is not there yet.
 
     Raises
     ------
@@ -77,44 +62,39 @@ def read_campaign(
     folder = Path(folder)
     if not folder.is_dir():
         raise InputError(f"{folder}: no such folder; a campaign is one with {HEADER} and {TABLE}")
-    header, path = read_header(folder, given), folder / TABLE
-    columns, warnings = read_positions(path)
-    campaign = parse_table(columns, header, path, plausible)
+    header, path = validate(Header, read_layer(folder / HEADER), folder / HEADER), folder / TABLE
+    text, warnings = "" if running and not path.exists() else _text_of(path), []
+    # Half a number is a number, too: if the file was cut there, only the line end is missing.
+    if text and not text.endswith("\n") and running:
+        text = text[: text.rfind("\n") + 1]
+        warnings = [f"{folder}: the last line of the table has no end yet; it is not counted"]
+    elif text and not text.endswith("\n"):
+        warnings = [f"{path}: the last line does not end; check that it is whole"]
+    columns = {} if running and not text.strip() else _columns_of(text, path)
+    if running and not any(columns.values()):
+        angles = None if header.sigma_angle is None else np.zeros((0, 2))
+        campaign = Campaign(header, table_of({"forces": np.zeros((0, 3)), "angles": angles}))
+    else:
+        campaign = _parse(columns, header, path, plausible)
+        warnings = [*_ignored_in(columns, path), *warnings]
     return replace(campaign, warnings=tuple(warnings))
 
 
-def read_header(folder: Path, given: Mapping[str, Any] | None = None) -> Header:
-    """Header of a campaign folder, overlaid key by key with `given`; errors as `read_campaign`."""
-    path = folder / HEADER
-    return validate(Header, overlay(read_layer(path), given or {}), path)
-
-
-def read_positions(path: Path) -> tuple[Table, list[str]]:
-    """Read the columns of a table, and warnings about them.
-
-    Raises
-    ------
-    InputError
-        If the file is missing or incomplete, or a column occurs twice.
-    """
+def _text_of(path: Path) -> str:
+    """Text of a table."""
     if not path.exists() and path.with_suffix(".parquet").exists():
         raise InputError(f"{path}: no such file; save {path.stem}.parquet as CSV")
     try:
-        text = read_text(path)
+        return read_text(path)
     except UnicodeDecodeError as error:
         raise InputError(f"{path}: not a CSV file in UTF-8 ({error.reason})") from None
-    columns, warnings = columns_of(text, path), []
-    # Half a number is a number, too: if the file was cut there, only the line end is missing.
-    if not text.endswith("\n"):
-        warnings = [f"{path}: the last line does not end; check that it is whole"]
-    return columns, warnings + ignored_in(columns, path)
 
 
-def ignored_in(columns: Table, path: Path) -> list[str]:
+def _ignored_in(columns: Table, path: Path) -> list[str]:
     """Warnings about columns that the format does not know."""
-    unknown = [name for name in columns if name not in KNOWN]
+    unknown = [name for name in columns if name not in KEYS]
     said = [
-        f"{path}: column {brief(name)} is not known and ignored{_hint(name, KNOWN)}"
+        f"{path}: column {brief(name)} is not known and ignored{_hint(name, KEYS)}"
         for name in unknown[:MOST_NAMED]
     ]
     if more := len(unknown) - len(said):
@@ -129,7 +109,7 @@ def _hint(name: str, known: Sequence[str]) -> str:
     return f"; did you mean {lower[near[0]]!r}?" if near else ""
 
 
-def columns_of(text: str, path: Path) -> Table:
+def _columns_of(text: str, path: Path) -> Table:
     """Columns of the text of a CSV table; errors name `path`."""
     try:
         reader = csv.reader(io.StringIO(text, newline=""), skipinitialspace=True, strict=True)
@@ -169,10 +149,11 @@ def write_campaign(campaign: Campaign, folder: str | Path, plausible: bool = Tru
         written.
     """
     folder = Path(folder)
-    path = folder / TABLE
-    header = validate(Header, _content_of(campaign), folder / HEADER)
-    columns = _columns_of(campaign.with_left_out, header)
-    parse_table(columns, header, path, plausible)
+    header, path = campaign.header, folder / TABLE
+    if campaign.reasons:
+        header = campaign.with_header(excluded=campaign.exclusions).header
+    columns = _columns_in_file(campaign)
+    _parse(columns, header, path, plausible)
     try:
         with whole_file(path) as part, part.open("w", newline="", encoding="utf-8") as file:
             writer = csv.writer(file, lineterminator="\n")
@@ -186,28 +167,29 @@ def write_campaign(campaign: Campaign, folder: str | Path, plausible: bool = Tru
         raise InputError(f"{folder}: cannot be written: {error.strerror or error}") from None
 
 
-def parse_table(columns: Table, header: Header, path: Path, plausible: bool = True) -> Campaign:
+def _parse(columns: Table, header: Header, path: Path, plausible: bool = True) -> Campaign:
     """Check the columns of the table `path`, and make a campaign of them and the header."""
     if not any(map(len, columns.values())):
         raise InputError(f"{path}: no positions; expected one row per hold")
     rows = [f"row {i}" for i in range(1, 1 + max(map(len, columns.values())))]
-    values: dict[str, Any] = {}
+    arrays: dict[str, Any] = {}
     for attribute, column in COLUMNS.items():
-        if not (column.needed or {*column.names} & {*columns}):
+        if not (column.needed or {*column.keys} & {*columns}):
             continue
-        parts = [_numbers(columns, name, column, rows, path) for name in column.names]
+        parts = [_numbers(columns, key, column, rows, path) for key in column.keys]
         if attribute == "positions":
             rows = [f"position {value:.0f}" for value in parts[0]]
         array = np.column_stack(parts) if parts[1:] else parts[0]
         array = header.conversion(attribute).to_si(array)
-        values[attribute] = array.astype(np.int64) if column.whole else array
-    _check_together(values, header, path)
+        arrays[attribute] = array.astype(np.int64) if column.whole else array
+    _check_together(arrays, header, path)
     if header.robot is not None:
-        values.setdefault("yaw", np.zeros(len(rows)))
-    campaign = campaign_of(header, values)
+        arrays.setdefault("yaw", np.zeros(len(rows)))
+    reasons = {entry.position: entry.reason for entry in header.excluded or ()}
+    # The table of holds says it from here on.
+    campaign = Campaign(header.model_copy(update={"excluded": None}), table_of(arrays))
     if plausible:
         check_plausible(campaign, f"{path.with_name(HEADER)} and {path.name}")
-    reasons = {entry.position: entry.reason for entry in header.excluded or ()}
     try:
         return campaign.without(reasons)
     except InputError as error:
@@ -217,9 +199,9 @@ def parse_table(columns: Table, header: Header, path: Path, plausible: bool = Tr
 def _numbers(columns: Table, name: str, column: Columns, rows: Sequence[str], path: Path) -> Array:
     """Numbers of a column, checked; errors name the row."""
     if name not in columns:
-        rest = ", ".join(other for other in column.names if other != name)
+        rest = ", ".join(other for other in column.keys if other != name)
         group = f" (it goes with {rest})" if rest else ""
-        others = [other for other in columns if other not in KNOWN]
+        others = [other for other in columns if other not in KEYS]
         raise InputError(f"{path}: {name}: the column is missing{group}{_hint(name, others)}")
     values = np.array([*map(_number, columns[name])])
 
@@ -249,16 +231,16 @@ def _number(cell: Any) -> float:
         return np.nan
 
 
-def _check_together(values: Mapping[str, Array], header: Header, path: Path) -> None:
+def _check_together(arrays: Mapping[str, Array], header: Header, path: Path) -> None:
     """Check that every channel works, and that angles and their sigma come together."""
-    for name, channel in zip(COLUMNS["forces"].names, values["forces"].T, strict=True):
+    for name, channel in zip(COLUMNS["forces"].keys, arrays["forces"].T, strict=True):
         if len(channel) > 1 and np.ptp(channel) == 0:
             raise InputError(
                 f"{path}: {name}: the same in all positions; a channel that works changes"
             )
-    angles = " and ".join(COLUMNS["angles"].names)
-    if "angles" not in values:
-        if "yaw" in values:
+    angles = " and ".join(COLUMNS["angles"].keys)
+    if "angles" not in arrays:
+        if "yaw" in arrays:
             raise InputError(f"{path}: yaw_robot_gon: goes with {angles}, which are missing")
         for key in ("robot", "reference"):
             if getattr(header, key) is not None:
@@ -272,61 +254,14 @@ def _check_together(values: Mapping[str, Array], header: Header, path: Path) -> 
         )
 
 
-def campaign_of(header: Header, values: Mapping[str, Any]) -> Campaign:
-    """Make a campaign of a header and of columns in SI, by attribute."""
-    sigma_angle = None
-    if header.robot is not None:
-        sigma_angle = header.robot.angle_sigma_mgon * MGON
-    elif header.reference is not None:
-        sigma_angle = header.reference.sigma_mps2 / header.gravity.value_mps2
-    of_header: dict[str, Any] = {}
-    for attribute, key in _OF_HEADER.items():
-        value: Any = header
-        for part in key.split("."):
-            value = getattr(value, part, None)
-        of_header[attribute] = value
-    return Campaign(
-        **of_header,
-        sigma_angle=sigma_angle,
-        nominal=None if header.nominal is None else header.conversion("forces"),
-        resolution=None if header.resolution_mps2 is None else np.array(header.resolution_mps2),
-        **values,
-    )
-
-
-def _content_of(campaign: Campaign) -> dict[str, Any]:
-    """Content of `campaign.yaml` for a campaign."""
-    content: dict[str, Any] = {"schema_version": 1}
-    for attribute, key in _OF_HEADER.items():
-        value = getattr(campaign, attribute)
-        block, _, inner = key.rpartition(".")
-        if value is not None:
-            (content.setdefault(block, {}) if block else content)[inner] = value
-    if campaign.sigma_force is None:
-        content.pop("sensor_noise", None)
-    if campaign.nominal is not None:
-        nominal = {"scale": campaign.nominal.scale, "offset": campaign.nominal.offset}
-        content["nominal"] = {k: np.asarray(v).tolist() for k, v in nominal.items()}
-    if campaign.resolution is not None:
-        content["resolution_mps2"] = np.asarray(campaign.resolution).tolist()
-    if campaign.left_out:
-        content["excluded"] = campaign.exclusions
-    if campaign.reference is None and campaign.sigma_angle is not None:
-        content["robot"] = {"angle_sigma_mgon": campaign.sigma_angle / MGON}
-    return content
-
-
-def _columns_of(campaign: Campaign, header: Header) -> dict[str, list[Any]]:
-    """Columns of a campaign in the units of the files."""
+def _columns_in_file(campaign: Campaign) -> dict[str, list[Any]]:
+    """Columns of all holds of a campaign, in the units of the file."""
+    holds = campaign.holds.reset_index()
     columns: dict[str, list[Any]] = {}
     for attribute, column in COLUMNS.items():
-        values, names = getattr(campaign, attribute), column.names
-        if values is None:
-            continue
-        shape = (campaign.n_positions, len(names)) if len(names) > 1 else (campaign.n_positions,)
-        if np.shape(values) != shape:
-            raise InputError(f"{campaign.name}: {attribute}: shape {np.shape(values)}, not {shape}")
-        if not column.whole:
-            values = header.conversion(attribute).from_si(np.asarray(values, dtype=float))
-        columns.update(zip(names, np.reshape(values, (-1, len(names))).T.tolist(), strict=True))
+        if column.names[0] in holds:
+            values = holds[[*column.names]].to_numpy()
+            if not column.whole:
+                values = campaign.header.conversion(attribute).from_si(values)
+            columns.update(zip(column.keys, values.T.tolist(), strict=True))
     return columns

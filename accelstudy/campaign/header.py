@@ -1,10 +1,10 @@
-"""The header of a campaign, the layout of its log included, and the columns of its table."""
+"""The header of a campaign, as `campaign.yaml` has it, the layout of its log included."""
 
 from __future__ import annotations
 
 from collections.abc import Callable
 from datetime import date as calendar_date
-from typing import Annotated, Any, ClassVar, Literal, NamedTuple, Self
+from typing import Annotated, Any, ClassVar, Literal, Self
 
 import numpy as np
 from pydantic import (
@@ -17,10 +17,10 @@ from pydantic import (
     model_validator,
 )
 
-from accelstudy.basics import bounds
 from accelstudy.basics.bounds import Range
 from accelstudy.basics.dates import read_date
-from accelstudy.basics.units import CLOCK_UNITS, GON, SENSOR_UNITS
+from accelstudy.basics.units import CLOCK_UNITS, GON, MGON, SENSOR_UNITS
+from accelstudy.campaign.columns import COLUMNS, MAX_CELL
 from accelstudy.campaign.reference import ReferenceSensor
 from accelstudy.campaign.unit_spellings import parse_unit
 from accelstudy.files.validation import (
@@ -43,74 +43,6 @@ from accelstudy.sensors.frames import Frame, parse_frame
 
 HEADER = "campaign.yaml"
 TABLE = "positions.csv"
-
-MAX_CELL = 1e12
-"""Larger than any measured value in any unit; squares and cubes of smaller ones stay finite."""
-ANY = Range(-MAX_CELL, MAX_CELL)
-
-
-class Columns(NamedTuple):
-    """Columns of the table that belong together: all of them are there, or none.
-
-    Attributes
-    ----------
-    names : tuple of str
-    meaning : str
-    unit : str, in the file; "unit" is the unit of the header
-    within : Range, in that unit
-    whole : bool, whether they are whole numbers
-    needed : bool
-    """
-
-    names: tuple[str, ...]
-    meaning: str
-    unit: str = ""
-    within: Range = ANY
-    whole: bool = False
-    needed: bool = False
-
-
-_NUMBER = Range(1, 2**53)  # beyond which not every integer is a float
-COLUMNS = {
-    "positions": Columns(
-        ("position",),
-        "number of the hold, from 1 on, in the order of acquisition",
-        within=_NUMBER,
-        whole=True,
-        needed=True,
-    ),
-    "time": Columns(
-        ("time_s",), "middle of the hold since the start of the session", "s", bounds.TIME
-    ),
-    "forces": Columns(
-        ("fx", "fy", "fz"),
-        "mean specific force of the hold, in sensor axes",
-        "unit",
-        needed=True,
-    ),
-    "n_samples": Columns(("n_samples",), "samples in the hold", within=_NUMBER, whole=True),
-    "sd": Columns(
-        ("sd_fx", "sd_fy", "sd_fz"),
-        "standard deviations of the samples within the hold",
-        "unit",
-        Range(0.0, MAX_CELL),
-    ),
-    "temperature": Columns(("temperature_degC",), "mean temperature", "°C", bounds.TEMPERATURE),
-    "angles": Columns(
-        ("roll_robot_gon", "pitch_robot_gon"),
-        "attitude that the robot tells, or a reference",
-        "gon",
-        bounds.ANGLE,
-    ),
-    "yaw": Columns(
-        ("yaw_robot_gon",), "yaw that the robot tells; 0 if absent", "gon", bounds.ANGLE
-    ),
-    "vibration": Columns(("vibration_mps2",), "rms of the vibration", "m/s²", bounds.VIBRATION),
-}
-"""Columns by the attribute of a campaign that they make up: what is read, checked, written and
-documented."""
-KNOWN = tuple(name for column in COLUMNS.values() for name in column.names)
-
 
 Place = Annotated[StrictInt, Field(ge=0)] | StrictStr
 """A column by its name in the header, or by its place, counted from 0."""
@@ -267,6 +199,24 @@ class Header(ConfigSection):
         if self.robot is not None and self.reference is not None:
             raise ValueError("robot: goes without reference: the angles are those of one of them")
         return self
+
+    @property
+    def sigma_force(self) -> float | None:
+        """A-priori standard deviation of a position mean, m/s²; None if unknown."""
+        return None if self.sensor_noise is None else self.sensor_noise.sigma_mps2
+
+    @property
+    def sigma_dof(self) -> float:
+        """Degrees of freedom of that noise, where it is an estimate; else infinite."""
+        stated = self.sensor_noise and self.sensor_noise.degrees_of_freedom
+        return stated or np.inf
+
+    @property
+    def sigma_angle(self) -> float | None:
+        """Standard deviation of the angles of a level hold, rad; None without angles."""
+        if self.reference is not None:
+            return self.reference.sigma_mps2 / self.gravity.value_mps2
+        return None if self.robot is None else self.robot.angle_sigma_mgon * MGON
 
     def conversion(self, attribute: str) -> Conversion:
         """Conversion of the columns of an attribute to SI."""

@@ -65,7 +65,8 @@ class LogImport:
             from accelstudy.campaign.importing import segmentation_figure
             from accelstudy.drawing.saving import save_all
 
-            offset = holds.means[0] - self.campaign.with_left_out.forces[0]
+            first = self.campaign.holds[["fx", "fy", "fz"]].to_numpy()[0]
+            offset = holds.means[0] - first
             draw = {"segmentation": lambda: segmentation_figure.draw_segmentation(holds, offset)}
             save_all(draw, folder)
 

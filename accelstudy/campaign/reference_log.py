@@ -102,7 +102,7 @@ class ReferenceLog:
 
     def angles_for(
         self, holds: Holds, offset: Array, gravity: float
-    ) -> tuple[Holds, dict[str, Any], str]:
+    ) -> tuple[Holds, Array, ReferenceSensor, str]:
         """Roll and pitch of the holds of a log, by the means of the reference in them.
 
         Parameters
@@ -114,7 +114,8 @@ class ReferenceLog:
         Returns
         -------
         holds : Holds, those that it covers; what is too near to the pole for a roll is left out
-        columns : dict, what the campaign gets
+        angles : (n, 2) array, rad
+        reference : ReferenceSensor, for the header of the campaign
         note : str, how the reference was used
 
         Raises
@@ -153,10 +154,10 @@ class ReferenceLog:
         )
         clock = "of the same clock" if np.isfinite(apart) else "begun together with the log"
         clock += "" if self.offset is None else f", {self.offset:+g} s"
-        columns = {"angles": angles, "sigma_angle": noise / gravity, "reference": reference}
         return (
             holds,
-            columns,
+            angles,
+            reference,
             (
                 f"reference: {self.path}, {clock}; its axes x, y, z point "
                 f"{frame.description.split(': ')[1]}, as frd of the sensor; sigma of a mean: "

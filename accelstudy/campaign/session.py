@@ -4,152 +4,194 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
-from typing import Any
+from functools import cached_property
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from accelstudy.basics.errors import InputError
 from accelstudy.basics.wording import plural
-from accelstudy.campaign.header import COLUMNS, LogLayout
-from accelstudy.campaign.reference import ReferenceSensor
+from accelstudy.campaign.columns import COLUMNS, split, table_of
+from accelstudy.campaign.header import Header
 from accelstudy.campaign.sensor_type import SensorType
 from accelstudy.effects import HoldConditions
-from accelstudy.sensors.conversion import Conversion
+from accelstudy.files.validation import validate
+
+if TYPE_CHECKING:
+    import pandas as pd
 
 Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Campaign:
-    """One calibration session of one sensor, in SI; n static holds in order of acquisition.
+    """One calibration session of one sensor: a header, and a table of static holds.
 
-    Holds that are left out of every fit are in `left_out` only. So no calculation uses them by
-    mistake, while `hold` and `with_left_out` still know them.
+    Arrays, such as `forces`, are of the n holds that are used. No calculation takes holds that are
+    left out by mistake, while `hold` still knows what came before a hold.
 
     Attributes
     ----------
-    name : str
-    positions : (n,) int array, the column `position`
-    forces : (n, 3) array, m/s², mean specific force of the holds in sensor axes
-    gravity, sigma_gravity : float, m/s²
-    unit : str, of the file ("m/s^2", "g", "mg" or "counts")
-    sensor : str, optional
-    date : str, optional, ISO 8601
-    sigma_force : float, m/s², a-priori sd of a position mean; None if unknown
-    sigma_dof : float, degrees of freedom of `sigma_force`, where it is an estimate
-    angles : (n, 2) array, rad, robot's roll and pitch; None without a robot
-    sigma_angle : float, rad, of a level hold; None without a robot
-    reference : ReferenceSensor, optional, which gave the angles instead of a robot
-    sensor_type : SensorType, optional, what other sensors of the type tell of this one
-    n_samples : (n,) int array, optional
-    sd : (n, 3) array, m/s², optional, sd of the samples within the holds
-    time, temperature, vibration, yaw : (n,) arrays in s, °C, m/s², rad, optional
-    nominal : Conversion, of the three axes; with unit "counts" only
-    full_range : float, m/s², optional, the sensor measures ± this
-    resolution : (3,) array, m/s², optional, steps in which the axes are read, 0 for none; where
-        rounding to them counts
-    log : LogLayout, optional, layout of the log from which the campaign was made
-    left_out : mapping, the same columns of the holds that were left out, and why, `reason`; empty
-        if there are none
+    header : Header, what `campaign.yaml` says
+    holds : DataFrame, in SI, in order of acquisition; the index is the position, the columns are
+        those of `COLUMNS`, and `left_out` is why a hold is left out of every fit, empty where it
+        is used
     warnings : tuple of str, what was ignored when the campaign was read
     notes : tuple of str, what the import of its log found and assumed
+    sensor_type : SensorType, optional, what other sensors of the type tell of this one
     truth : mapping, of a simulated campaign: the settings, and all that was drawn
     """
 
-    name: str
-    positions: NDArray[np.int_]
-    forces: Array
-    gravity: float
-    sigma_gravity: float = 0.0
-    unit: str = "m/s^2"
-    sensor: str | None = None
-    date: str | None = None
-    sigma_force: float | None = None
-    sigma_dof: float | None = None
-    angles: Array | None = None
-    sigma_angle: float | None = None
-    reference: ReferenceSensor | None = None
-    n_samples: NDArray[np.int_] | None = None
-    sd: Array | None = None
-    time: Array | None = None
-    temperature: Array | None = None
-    vibration: Array | None = None
-    yaw: Array | None = None
-    nominal: Conversion | None = None
-    full_range: float | None = None
-    resolution: Array | None = None
-    log: LogLayout | None = None
-    left_out: Mapping[str, NDArray[Any]] = field(default_factory=dict)
-    warnings: tuple[str, ...] = field(default=())
-    notes: tuple[str, ...] = field(default=())
+    header: Header
+    holds: pd.DataFrame
+    warnings: tuple[str, ...] = ()
+    notes: tuple[str, ...] = ()
     sensor_type: SensorType | None = None
     truth: Mapping[str, Any] = field(default_factory=dict)
+
+    @classmethod
+    def of(cls, content: Mapping[str, Any], **arrays: Any) -> Campaign:
+        """Make a campaign of arrays.
+
+        Parameters
+        ----------
+        content : mapping, keys and values of `campaign.yaml`; at least `name` and `gravity`
+        arrays : in SI, by the names of the attributes: `forces`, and perhaps others
+
+        Raises
+        ------
+        InputError
+            If a value cannot be right, or an array has another length.
+        """
+        content = {"schema_version": 1, "unit": "m/s^2", **content}
+        return cls(validate(Header, content, content.get("name", "campaign")), table_of(arrays))
 
     def __repr__(self) -> str:
         return f"Campaign({self.name!r}, {plural(self.n_positions, 'position')})"
 
     def _repr_html_(self) -> str:
-        import pandas as pd
-
         from accelstudy.pages.notebook import notebook_html
 
-        units = {"time": "s", "temperature": "°C", "vibration": "m/s²"}
-        columns = dict(zip(("fx / m/s²", "fy / m/s²", "fz / m/s²"), self.forces.T, strict=True))
-        for name, unit in units.items():
-            if (values := getattr(self, name)) is not None:
-                columns[f"{name} / {unit}"] = values
-        table = pd.DataFrame(columns, index=pd.Index(self.positions, name="position"))
+        names = {
+            name: f"{name} / {columns.si}" if columns.si else name
+            for columns in COLUMNS.values()
+            for name in columns.names
+        }
+        table = self.holds[self.used].drop(columns="left_out").rename(columns=names)
         beside = "without a robot" if self.angles is None else "with a robot"
-        if self.reference is not None:
-            beside = f"beside the sensor of {self.reference.calibration}"
+        if self.header.reference is not None:
+            beside = f"beside the sensor of {self.header.reference.calibration}"
         said = f"{plural(self.n_positions, 'position')} {beside}"
         return notebook_html(f"Campaign {self.name}", "; ".join([said, *self.warnings]), table)
 
     @property
-    def n_positions(self) -> int:
-        """Number of static holds, without those that were left out."""
-        return len(self.forces)
+    def name(self) -> str:
+        """Name of the campaign."""
+        return self.header.name
+
+    @property
+    def gravity(self) -> float:
+        """Local gravity, m/s²."""
+        return self.header.gravity.value_mps2
+
+    @property
+    def sigma_force(self) -> float | None:
+        """A-priori standard deviation of a position mean, m/s²; None if unknown."""
+        return self.header.sigma_force
 
     @property
     def prior(self) -> str | None:
         """Path of the file with prior knowledge; None if there is none."""
         return None if self.sensor_type is None else self.sensor_type.file
 
+    @cached_property
+    def used(self) -> NDArray[np.bool_]:
+        """Which of the holds are used."""
+        return self.holds["left_out"].to_numpy() == ""
+
     @property
+    def n_positions(self) -> int:
+        """Number of holds that are used."""
+        return int(self.used.sum())
+
+    @cached_property
+    def positions(self) -> NDArray[np.int_]:
+        """Numbers of the holds, (n,)."""
+        return self.holds.index.to_numpy()[self.used]
+
+    @cached_property
+    def forces(self) -> Array:
+        """Mean specific forces in sensor axes, (n, 3), m/s²."""
+        forces = self._array("forces")
+        assert forces is not None
+        return forces
+
+    @cached_property
+    def angles(self) -> Array | None:
+        """Roll and pitch that the robot tells, or a reference, (n, 2), rad; None without one."""
+        return self._array("angles")
+
+    @cached_property
+    def n_samples(self) -> NDArray[np.int_] | None:
+        """Samples in the holds, (n,)."""
+        return self._array("n_samples")
+
+    @cached_property
+    def sd(self) -> Array | None:
+        """Standard deviations of the samples within the holds, (n, 3), m/s²."""
+        return self._array("sd")
+
+    @cached_property
+    def time(self) -> Array | None:
+        """Middle of the holds since the start of the session, (n,), s."""
+        return self._array("time")
+
+    @cached_property
+    def temperature(self) -> Array | None:
+        """Temperature of the holds, (n,), °C."""
+        return self._array("temperature")
+
+    @cached_property
+    def vibration(self) -> Array | None:
+        """Vibration of the holds, rms, (n,), m/s²."""
+        return self._array("vibration")
+
+    @cached_property
+    def yaw(self) -> Array | None:
+        """Yaw that the robot tells, (n,), rad."""
+        return self._array("yaw")
+
+    def _array(self, attribute: str) -> Any:
+        """Array of the holds that are used, of the columns of an attribute."""
+        names = COLUMNS[attribute].names
+        if names[0] not in self.holds:
+            return None
+        columns = [self.holds[name].to_numpy()[self.used] for name in names]
+        array = np.column_stack(columns) if len(names) > 1 else columns[0]
+        array.setflags(write=False)  # a change would not reach the table
+        return array
+
+    @cached_property
     def hold(self) -> HoldConditions:
         """Conditions of the holds, such as time and temperature, as the effects take them."""
+        known = [name for name in HoldConditions.columns() if name in self.holds]
+        conditions: dict[str, Any] = {name: self.holds[name].to_numpy() for name in known}
+        session = HoldConditions(**conditions, full_range=self.header.range_mps2)
         # The position before a hold acts on it, whether that position is used or not.
-        whole, used = self._rows()
-        session = HoldConditions(time=whole.get("time"), temperature=whole.get("temperature"))
-        session = session.with_steps(whole["forces"]).take(np.flatnonzero(used))
-        roll, pitch = (None, None) if self.angles is None else self.angles.T
-        return replace(
-            session,
-            vibration=self.vibration,
-            roll=roll,
-            pitch=pitch,
-            yaw=self.yaw,
-            full_range=self.full_range,
-        )
+        forces = self.holds[[*COLUMNS["forces"].names]].to_numpy()
+        return session.with_steps(forces).take(np.flatnonzero(self.used))
 
     @property
     def reasons(self) -> dict[int, str]:
-        """Why positions were left out, by their numbers."""
-        if not self.left_out:
-            return {}
-        pairs = (self.left_out[name].tolist() for name in ("positions", "reason"))
-        return dict(zip(*pairs, strict=True))
+        """Why positions are left out, by their numbers."""
+        left_out = self.holds["left_out"][~self.used]
+        return dict(zip(left_out.index.tolist(), left_out.tolist(), strict=True))
 
     @property
     def exclusions(self) -> list[dict[str, Any]]:
-        """Positions that were left out, each with its reason, as the header has them."""
+        """Positions that are left out, each with its reason, as the header has them."""
         return [{"position": n, "reason": reason} for n, reason in self.reasons.items()]
-
-    @property
-    def with_left_out(self) -> Campaign:
-        """The campaign with all its holds, as its file has them."""
-        return replace(self, **self._rows()[0], left_out={}) if self.left_out else self
 
     def without(self, reasons: Mapping[int, str]) -> Campaign:
         """Leave out holds.
@@ -171,20 +213,41 @@ class Campaign:
             raise InputError(f"{self.name}: excluded: there is no position {unknown[0]}")
         if np.isin(self.positions, list(reasons)).all():
             raise InputError(f"{self.name}: excluded: no position is left")
-        why, (rows, _) = {**self.reasons, **reasons}, self._rows()
-        out = np.isin(rows["positions"], list(why))
-        left_out = {name: values[out] for name, values in rows.items()}
-        left_out["reason"] = np.array([why[n] for n in left_out["positions"].tolist()])
-        used: dict[str, Any] = {name: values[~out] for name, values in rows.items()}
-        return replace(self, **used, left_out=left_out)
+        why = {**self.reasons, **reasons}
+        left_out = [why.get(position, "") for position in self.holds.index.tolist()]
+        return replace(self, holds=self.holds.assign(left_out=left_out))
 
-    def _rows(self) -> tuple[dict[str, Any], NDArray[np.bool_]]:
-        """Columns with all the holds, and which of them are used."""
-        rows = {name: values for name in COLUMNS if (values := getattr(self, name)) is not None}
-        used = np.ones(self.n_positions, dtype=bool)
-        if not self.left_out:
-            return rows, used
-        out = self.left_out
-        order = np.argsort(np.concatenate([rows["positions"], out["positions"]]))
-        rows = {k: np.concatenate([rows[k], out[k]])[order] for k in rows if k in out}
-        return rows, (np.arange(len(order)) < self.n_positions)[order]
+    def with_arrays(self, **arrays: Any) -> Campaign:
+        """Return the campaign with other values of the holds that are used.
+
+        Parameters
+        ----------
+        arrays : by the names of the attributes, such as `forces` and `time`, in SI; None leaves
+            the columns out
+        """
+        holds = {name: self.holds[name].to_numpy() for name in self.holds}
+        for attribute, values in arrays.items():
+            if values is None:
+                for name in COLUMNS[attribute].names:
+                    holds.pop(name, None)
+                continue
+            for name, column in split(attribute, values, self.n_positions).items():
+                whole = np.array(holds.get(name, np.full(len(self.holds), np.nan)))
+                whole[self.used] = column
+                holds[name] = whole
+        return replace(self, holds=type(self.holds)(holds, self.holds.index))
+
+    def with_sigma(self, sigma_force: float | None) -> Campaign:
+        """Return the campaign with a noise of a position mean, m/s², that is known; None is not."""
+        noise = None if sigma_force is None else {"sigma_mps2": sigma_force}
+        return self.with_header(sensor_noise=noise)
+
+    def with_header(self, **keys: Any) -> Campaign:
+        """Return the campaign with other values of keys of `campaign.yaml`.
+
+        Raises
+        ------
+        InputError
+            If a value cannot be right.
+        """
+        return replace(self, header=validate(Header, {**dict(self.header), **keys}, self.name))

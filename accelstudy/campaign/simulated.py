@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from dataclasses import fields
+from dataclasses import fields, replace
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
@@ -17,6 +17,7 @@ from accelstudy.approaches import get_approach
 from accelstudy.basics import bounds
 from accelstudy.basics.errors import InputError, UnknownNameError
 from accelstudy.basics.registry import WithSettings
+from accelstudy.basics.units import MGON
 from accelstudy.campaign.session import Campaign
 from accelstudy.effects import Effect, get_effect
 from accelstudy.files.outputs import whole_file
@@ -75,27 +76,31 @@ def simulate_campaign(given: Mapping[str, Any]) -> Campaign:
     ideal = session(model, parameters, directions, settings.gravity, hold)
     drawn = ideal.draw(noise, 1, rng["noise"])
     robot = get_approach(settings.approach).uses_angles
-    samples: dict[str, Any] = {}
+    columns: dict[str, Any] = {}
     if settings.n_samples is not None:
         n = settings.n_samples
         # σ√n, with the scatter of the sd of normal samples.
         within = np.prod([effect.within_hold for effect in noise_effects], axis=0)
         scatter = np.sqrt(rng["sd"].chisquare(n - 1, (len(directions), 3)) / (n - 1))
         sd = settings.sigma * np.sqrt(n) * within * scatter
-        samples = {"n_samples": np.full(len(directions), n), "sd": sd}
-    return Campaign(
-        name=settings.name,
-        positions=np.arange(1, len(directions) + 1),
+        columns = {"n_samples": np.full(len(directions), n), "sd": sd}
+    if robot and drawn.angles is not None:
+        columns |= {"angles": drawn.angles[0], "yaw": hold.yaw if settings.yaw != "none" else None}
+    campaign = Campaign.of(
+        {
+            "name": settings.name,
+            "gravity": {"value_mps2": settings.gravity},
+            "sensor_noise": {"sigma_mps2": settings.sigma} if settings.sigma_known else None,
+            "robot": {"angle_sigma_mgon": settings.robot_sigma / MGON} if robot else None,
+        },
         forces=drawn.forces[0],
-        gravity=settings.gravity,
-        sigma_force=settings.sigma if settings.sigma_known else None,
-        angles=drawn.angles[0] if robot and drawn.angles is not None else None,
-        sigma_angle=settings.robot_sigma if robot else None,
-        **samples,
         time=hold.time,
         temperature=hold.temperature,
         vibration=hold.vibration,
-        yaw=hold.yaw if robot and settings.yaw != "none" else None,
+        **columns,
+    )
+    return replace(
+        campaign,
         truth={
             "schema_version": 1,
             "campaign": settings.name,

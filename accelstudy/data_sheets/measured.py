@@ -84,7 +84,7 @@ def sheet_of_campaign(folder: str | Path) -> DataSheet:
     source = f"sigma of the campaign {campaign.name}"
     return DataSheet(
         campaign.name,
-        campaign.sensor or f"the sensor of the campaign {campaign.name}",
+        campaign.header.sensor or f"the sensor of the campaign {campaign.name}",
         source,
         position_sigma=campaign.sigma_force,
         sources={"position_sigma": source},

@@ -97,7 +97,7 @@ class Sensor:
         """The campaign, with the sigma that counts."""
         if self.noise is None:
             return self.campaign
-        return replace(self.campaign, sigma_force=self.noise.sigma, sigma_dof=None)
+        return self.campaign.with_sigma(self.noise.sigma)
 
     def fit(self) -> BaseFit:
         """Fit the model to the campaign.

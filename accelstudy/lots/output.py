@@ -121,7 +121,7 @@ class Lot(Result):
         usable, without, first = list[Campaign](), dict[str, str](), dict[bytes, str]()
         names = own_names([campaign.name for campaign in campaigns])
         for given, name in zip(campaigns, names, strict=True):
-            campaign = replace(given, name=name)
+            campaign = given.with_header(name=name)
             # Noise never repeats: the same numbers are the same log, whatever its folder.
             if (same := first.setdefault(campaign.forces.tobytes(), name)) != name:
                 without[name] = f"{name}: has the readings of {same}; each sensor counts once"

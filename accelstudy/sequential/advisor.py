@@ -244,7 +244,7 @@ def next_holds(campaign: Campaign, directions: Array) -> HoldConditions:
         vibration=zero,
         yaw=zero,
         order=zero + 1,
-        full_range=campaign.full_range,
+        full_range=campaign.header.range_mps2,
     )
     if n:
         last = campaign.hold.take(np.full(len(f_b), n - 1))

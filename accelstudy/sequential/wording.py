@@ -26,7 +26,7 @@ down."""
 
 def advice_lines(advice: Advice) -> list[str]:
     """Write the advice, most important last."""
-    log = advice.session.log
+    log = advice.session.header.log
     return pages.render_lines(
         SENTENCES,
         "lines",

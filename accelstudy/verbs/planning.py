@@ -225,12 +225,12 @@ def advise(
         accelstudy advise my-campaign --tilt-accuracy 10mgon --tilt-range 30gon
     """
     given = {**locals()}
+    from accelstudy.campaign.format import read_campaign
     from accelstudy.sequential.advisor import advise_session
-    from accelstudy.sequential.running import read_running
     from accelstudy.verbs.inputs import as_campaign, campaign_path
 
     place = campaign_path(given.pop("campaign"))
-    session = as_campaign(campaign) if place is None else read_running(place)
+    session = as_campaign(campaign) if place is None else read_campaign(place, running=True)
     return advise_session(session, place, **given)
 
 

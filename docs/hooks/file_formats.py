@@ -3,7 +3,7 @@
 import griffe
 from markdown_text import code, plain, table
 
-from accelstudy.campaign.header import ANY, COLUMNS
+from accelstudy.campaign.columns import ANY, COLUMNS
 from accelstudy.diagnosis.rules import RULES
 
 
@@ -11,7 +11,7 @@ def positions():
     """Columns of the positions of a campaign."""
     rows = [
         (
-            ", ".join(map(code, column.names)),
+            ", ".join(map(code, column.keys)),
             "whole number" if column.whole else "number",
             "*unit*" if column.unit == "unit" else column.unit,
             "" if column.within is ANY else f"{column.within.least:g} … {column.within.most:g}",

@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import warnings
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -46,7 +45,7 @@ class Problem:
         approach, self.sigma_known = usual_approach(campaign), campaign.sigma_force is not None
         fit = fit_campaign(campaign, model, approach)
         for _ in range(0 if self.sigma_known else 2):
-            weighted = replace(campaign, sigma_force=fit.sigma_position_posteriori)
+            weighted = campaign.with_sigma(fit.sigma_position_posteriori)
             fit = fit_campaign(weighted, model, approach)
         frame = SessionFit.of(solve(fit.model, fit.approach, fit.observed, fit.adjustment))
         self.z, self.redundancy = frame.residuals.z, frame.residuals.redundancy

@@ -162,7 +162,8 @@ def frame(request):
         seed=4, scheme="fibonacci-15", repeats=2, approach=request.param,
         temperature=(10.0, 40.0), temperature_order="random",
     )  # fmt: skip
-    fit = fit_campaign(replace(campaign, sigma_gravity=1e-3), NINE, get_approach(request.param))
+    gravity = {"value_mps2": campaign.gravity, "sigma_mps2": 1e-3}
+    fit = fit_campaign(campaign.with_header(gravity=gravity), NINE, get_approach(request.param))
     return SessionFit.of(solve(NINE, fit.approach, fit.observed, fit.adjustment))
 
 

@@ -6,7 +6,6 @@ or missing, words stand where others should, and a value is of another kind. Opt
 
 import json
 import shutil
-from dataclasses import replace
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
@@ -26,7 +25,6 @@ from accelstudy.basics.errors import InputError
 from accelstudy.campaign.format import read_campaign, write_campaign
 from accelstudy.data_sheets import get_data_sheet
 from accelstudy.schemes import get_scheme
-from accelstudy.sensors.conversion import Conversion
 
 TRUTH = {"b_x": 0.05, "s_z": 2e-4, "alpha_zx": 7e-4}
 AT_REST = np.random.default_rng(1).normal([0.5, -0.3, -9.7], 0.3, (30, 3))
@@ -43,7 +41,7 @@ CONTENTS = {
     "scheme.yaml": {"scheme": "mine", "directions": get_scheme("fibonacci-12").directions.tolist()},
     "box.yaml": {"title": "box", "scale": "3000 ppm", "velocity_random_walk": "1 mm/s^2/sqrt(Hz)"},
 }  # fmt: skip
-COUNTS = Conversion(np.array([0.01, -0.01, 0.02]), np.array([10.0, 20.0, 0.0]))
+COUNTS = {"scale": [0.01, -0.01, 0.02], "offset": [10.0, 20.0, 0.0]}
 
 # --- damages -------------------------------------------------------------------------------------
 
@@ -150,7 +148,7 @@ def whole(tmp_path_factory):
     folder = tmp_path_factory.mktemp("whole")
     robot = acs.simulate_campaign(n_samples=5, temperature=(10, 40), yaw="random")
     write_campaign(robot, folder / "campaign")
-    write_campaign(replace(robot, unit="counts", nominal=COUNTS), folder / "counts")
+    write_campaign(robot.with_header(unit="counts", nominal=COUNTS), folder / "counts")
     document = acs.calibrate(simulated_campaign(TRUTH), approach="gravity").content
     (folder / "calibration.json").write_text(json.dumps(document), encoding="utf-8")
     LOG.to_csv(folder / "log.csv", index=False)

@@ -109,7 +109,7 @@ def calibrated(effects, values, approach="gravity", **changes):
         temperature_order="random", vibration="0:2", yaw="random",
     )  # fmt: skip
     model = f"bias-scale-nonorthogonality+{effects}"
-    return acs.calibrate(replace(campaign, **changes), model=model, approach=approach).sensor
+    return acs.calibrate(campaign.with_arrays(**changes), model=model, approach=approach).sensor
 
 
 def rows_of(effects, values, **columns):

@@ -6,14 +6,13 @@ import numpy as np
 import pandas as pd
 import pytest
 from calling import succeed
-from campaign_helpers import simulated_campaign
+from campaign_helpers import made, simulated_campaign
 from log_helpers import table
 from page_helpers import assert_sound, text_of
 from usual import NINE
 
 import accelstudy as acs
 from accelstudy.campaign.format import read_campaign, write_campaign
-from accelstudy.campaign.session import Campaign
 
 TRUTH = {"b_x": 0.05, "b_y": 0.01, "b_z": 0.03, "s_x": 2e-4, "alpha_zx": 7e-4}
 
@@ -62,7 +61,7 @@ def test_little_redundancy_is_said(tmp_path, n, words):
     scheme = "d-optimal-9" if n == 9 else "fibonacci-10"
     for sigma in (0.002, None):
         drawn = simulated_campaign(TRUTH, scheme=scheme)
-        plain = Campaign("few", drawn.positions, drawn.forces, drawn.gravity, sigma_force=sigma)
+        plain = made(drawn.forces, drawn.gravity, sigma)
         write_campaign(plain, tmp_path / "few")
         result = succeed("calibrate", tmp_path / "few", "--out", tmp_path / f"out{sigma}")
         if sigma or n == 9:

@@ -4,14 +4,13 @@ import re
 
 import numpy as np
 import pytest
-from campaign_helpers import FIVE_AXES, simulated_campaign
+from campaign_helpers import FIVE_AXES, made, simulated_campaign
 from usual import GRAVITY, NINE, ROBOT
 
 from accelstudy.basics.errors import InputError
 from accelstudy.campaign.calibration.assessment import Assessment
 from accelstudy.campaign.calibration.fit import fit_campaign, initial_values
 from accelstudy.campaign.calibration.wording import verdict_lines
-from accelstudy.campaign.session import Campaign
 from accelstudy.schemes import get_scheme
 from accelstudy.sensors.models import get_model
 
@@ -50,7 +49,9 @@ def test_a_nonlinear_model_has_no_matrix():
 def test_positions_in_conflict_are_not_blamed_alone(bumped, said):
     """A bumped hold stands out, and so do those after a knock of the mounting."""
     measured = simulated_campaign({"b_x": 0.1}, seed=2)
-    measured.forces[bumped] *= np.array([[1.01], [0.994], [1.003]])[: len(bumped)]
+    factors = np.ones((measured.n_positions, 1))
+    factors[bumped, 0] = [1.01, 0.994, 1.003][: len(bumped)]
+    measured = measured.with_arrays(forces=factors * measured.forces)
     lines = verdict_lines(Assessment(fit_campaign(measured, NINE, GRAVITY)))
     found = [line for line in lines if line.startswith("In conflict")]
     assert len(found) == bool(bumped)
@@ -65,10 +66,10 @@ def test_the_noise_of_readings_gives_no_rank(sigma, repeats, stated):
     """Neither the noise nor the scales and angles of a sensor make eight parameters nine."""
     sensor = np.array([[1.004, 0, 0], [0.005, 0.997, 0], [-0.008, 0.006, 1.006]])
     ideal = -9.80665 * np.repeat(FIVE_AXES, repeats, axis=0) @ sensor.T + [0.12, -0.08, 0.2]
-    rng, numbers = np.random.default_rng(36), np.arange(len(ideal))
+    rng = np.random.default_rng(36)
     for _ in range(15):
         forces = ideal + sigma * rng.standard_normal(ideal.shape)
-        read = Campaign("read", numbers, forces, 9.80665, sigma_force=sigma if stated else None)
+        read = made(forces, sigma=sigma if stated else None)
         with pytest.raises(InputError, match=r"rank 8 of 9: .*s_x, s_y, s_z"):
             fit_campaign(read, NINE, GRAVITY)
 
@@ -79,7 +80,7 @@ def test_what_shows_weakly_but_above_the_noise_is_determined():
     faces /= np.linalg.norm(faces, axis=1)[:, None]
     forces = -9.80665 * faces * [1.004, 0.997, 1.006] + [0.12, -0.08, 0.2]
     forces += 2e-4 * np.random.default_rng(36).standard_normal(forces.shape)
-    read = Campaign("read", np.arange(10), forces, 9.80665, sigma_force=2e-4)
+    read = made(forces, sigma=2e-4)
     fit = fit_campaign(read, NINE, GRAVITY)
     off = fit.parameters[:6] - [0.12, -0.08, 0.2, 0.004, -0.003, 0.006]
     assert np.all(np.abs(off) < 4 * fit.sigma[:6])

@@ -1,6 +1,6 @@
 """The campaign format: what is written is read again, and what is wrong ends in one clear line."""
 
-from dataclasses import fields, replace
+from dataclasses import replace
 from functools import cache
 from pathlib import Path
 from tempfile import TemporaryDirectory
@@ -14,70 +14,85 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from accelstudy.basics.errors import InputError, printable_line
-from accelstudy.basics.units import GON, MGON, STANDARD_GRAVITY
+from accelstudy.basics.units import GON, STANDARD_GRAVITY
+from accelstudy.campaign.columns import COLUMNS, KEYS
 from accelstudy.campaign.format import read_campaign, write_campaign
-from accelstudy.campaign.header import COLUMNS, KNOWN, LogLayout
+from accelstudy.campaign.header import LogLayout
 from accelstudy.campaign.session import Campaign
 from accelstudy.leveling.angles import specific_force
-from accelstudy.sensors.conversion import Conversion
 
 ROLL = np.array([0.0, 50.0, 100.0, 150.0, 200.0, -50.0, -100.0, 0.0])
 PITCH = np.array([0.0, 20.0, -40.0, 10.0, 0.0, 80.0, -60.0, -80.0])
 G = 9.81
 
 
-def campaign(**changes):
+HEADER = {
+    "name": "small", "sensor": "a sensor", "range_mps2": 20.0,
+    "gravity": {"value_mps2": G, "sigma_mps2": 1e-5},
+    "sensor_noise": {"sigma_mps2": 0.002}, "robot": {"angle_sigma_mgon": 3.2},
+    "log": LogLayout(columns={"fx": 0, "fy": "b", "fz": 2}, rate_hz=100, frame="flu"),
+}  # fmt: skip
+
+
+def campaign(header=(), **changes):
     """A small campaign with everything, whose forces fit the robot's angles to 0.02 m/s²."""
     n = len(ROLL)
     noise = np.random.default_rng(1).normal(0, 0.02, (n, 3))
-    everything = Campaign(
-        name="small", sensor="a sensor", positions=np.arange(1, n + 1),
-        forces=np.column_stack(specific_force(ROLL * GON, PITCH * GON, G)) + noise, gravity=G,
-        sigma_gravity=1e-5, sigma_force=0.002, angles=np.column_stack([ROLL, PITCH]) * GON,
-        sigma_angle=3.2 * MGON, n_samples=np.full(n, 200), sd=np.full((n, 3), 0.03),
-        full_range=20.0,
-        log=LogLayout(columns={"fx": 0, "fy": "b", "fz": 2}, rate_hz=100, frame="flu"),
-        time=10.0 * np.arange(n), temperature=np.linspace(-5, 30, n), vibration=np.full(n, 0.001),
-        yaw=np.linspace(-1, 1, n),
-    )  # fmt: skip
-    return replace(everything, **changes)
+    arrays = {
+        "forces": np.column_stack(specific_force(ROLL * GON, PITCH * GON, G)) + noise,
+        "angles": np.column_stack([ROLL, PITCH]) * GON, "yaw": np.linspace(-1, 1, n),
+        "n_samples": np.full(n, 200), "sd": np.full((n, 3), 0.03), "time": 10.0 * np.arange(n),
+        "temperature": np.linspace(-5, 30, n), "vibration": np.full(n, 0.001),
+    }  # fmt: skip
+    return Campaign.of({**HEADER, **dict(header)}, **{**arrays, **changes})
 
 
 def assert_same(read, written):
-    for field in fields(Campaign):
-        one, other = getattr(read, field.name), getattr(written, field.name)
-        if isinstance(other, np.ndarray):
-            # Counts have an offset, so what is exact is relative to the norm, not to each number.
-            size = np.abs(other).max(initial=0)
-            np.testing.assert_allclose(
-                one, other, rtol=1e-12, atol=1e-12 * size, err_msg=field.name
-            )
-        elif isinstance(other, float):
-            assert one == pytest.approx(other, rel=1e-12), field.name
-        elif isinstance(other, Conversion):
-            np.testing.assert_array_equal([one.scale, one.offset], [other.scale, other.offset])
-        else:
-            assert one == other, field.name
+    assert read.header == written.header
+    assert read.warnings == written.warnings
+    # Counts have an offset, so what is exact is relative to the largest number.
+    sizes = written.holds.drop(columns="left_out").abs().max().clip(lower=1e-300)
+    pd.testing.assert_frame_equal(
+        read.holds.drop(columns="left_out") / sizes,
+        written.holds.drop(columns="left_out") / sizes,
+        rtol=1e-12, atol=1e-12, check_like=True,
+    )  # fmt: skip
+    assert read.reasons == written.reasons
 
 
 def test_holds_that_are_left_out_stay_in_the_file_and_in_the_history(tmp_path):
     every = campaign(temperature=np.arange(8.0) ** 2)
     reasons = {3: "moved", 8: "bumped"}
-    write_campaign(every.without({8: "bumped"}).without({3: "moved"}), tmp_path)
+    some = every.without({8: "bumped"}).without({3: "moved"})
+    write_campaign(some, tmp_path)
     assert len((tmp_path / "positions.csv").read_text().splitlines()) == 1 + every.n_positions
     read = read_campaign(tmp_path)
     assert read.positions.tolist() == [1, 2, 4, 5, 6, 7]
     assert read.reasons == reasons
     assert read.exclusions[0] == {"position": 3, "reason": "moved"}
-    assert_same(read.with_left_out, every)
+    assert_same(read, some)
     kept = read.positions - 1
     for name in ("step_x", "temperature", "yaw", "roll", "order"):
         np.testing.assert_allclose(
             getattr(read.hold, name), getattr(every.hold, name)[kept], atol=1e-12
         )
     np.testing.assert_allclose(read.hold.lagged(20), every.hold.lagged(20)[kept], atol=1e-12)
-    untimed = replace(every, time=None).without(reasons)
+    untimed = every.with_arrays(time=None).without(reasons)
     assert untimed.hold.order.tolist() == [1, 2, 4, 5, 6, 7]
+
+
+def test_other_values_are_those_of_the_holds_that_are_used():
+    some = campaign().without({3: "moved"})
+    changed = some.with_arrays(time=np.arange(7.0), forces=2 * some.forces, yaw=None)
+    assert changed.holds["time"].tolist() == [0, 1, 20, 2, 3, 4, 5, 6]
+    np.testing.assert_array_equal(changed.forces, 2 * some.forces)
+    assert changed.yaw is None
+    assert some.yaw is not None
+    assert campaign().with_sigma(None).sigma_force is None
+    with pytest.raises(InputError, match="small: name: must not be empty"):
+        some.with_header(name="")
+    with pytest.raises(InputError, match=r"time: shape \(8,\), not \(7,\)"):
+        some.with_arrays(time=np.arange(8.0))
 
 
 @pytest.mark.parametrize(("reasons", "message"), [
@@ -110,19 +125,21 @@ def campaigns(draw):
     robot = draw(st.booleans())
     unit = draw(st.sampled_from(["m/s^2", "g", "counts"]))
     scale, offset = rng.uniform(1e-4, 1e-2, 3) * rng.choice([-1, 1], 3), rng.normal(0, 3e4, 3)
-    return Campaign(
-        name=draw(texts.filter(bool)),
-        sensor=maybe(draw(texts)),
-        positions=np.cumsum(rng.integers(1, 3, n)), forces=forces, gravity=gravity,
-        sigma_gravity=draw(st.just(0.0) | floats(1e-9, 1e-3)), unit=unit,
-        sigma_force=maybe(draw(floats(1e-6, 1))),
+    header = {
+        "name": draw(texts.filter(bool)), "sensor": maybe(draw(texts)), "unit": unit,
+        "gravity": {"value_mps2": gravity, "sigma_mps2": draw(st.just(0.0) | floats(1e-9, 1e-3))},
+        "sensor_noise": maybe({"sigma_mps2": draw(floats(1e-6, 1))}),
+        "robot": {"angle_sigma_mgon": draw(st.just(0.0) | floats(1e-6, 60))} if robot else None,
+        "range_mps2": maybe(draw(floats(20, 200))),
+        "nominal": {"scale": [*scale], "offset": [*offset]} if unit == "counts" else None,
+    }  # fmt: skip
+    return Campaign.of(
+        header,
+        positions=np.cumsum(rng.integers(1, 3, n)), forces=forces,
         angles=np.column_stack([roll, pitch]) if robot else None,
-        sigma_angle=draw(st.just(0.0) | floats(1e-9, 1e-3)) if robot else None,
         yaw=rng.normal(size=n) if robot else None, n_samples=maybe(rng.integers(1, 10**6, n)),
-        sd=maybe(rng.uniform(0, 1, (n, 3))), full_range=maybe(draw(floats(20, 200))),
-        time=maybe(np.cumsum(rng.uniform(0, 60, n))), temperature=maybe(rng.uniform(-40, 85, n)),
-        vibration=maybe(rng.uniform(0, 1, n)),
-        nominal=Conversion(scale, offset) if unit == "counts" else None,
+        sd=maybe(rng.uniform(0, 1, (n, 3))), time=maybe(np.cumsum(rng.uniform(0, 60, n))),
+        temperature=maybe(rng.uniform(-40, 85, n)), vibration=maybe(rng.uniform(0, 1, n)),
     )  # fmt: skip
 
 
@@ -152,7 +169,7 @@ def test_units_of_the_file(tmp_path):
 def test_yaw_of_a_robot_that_gives_none_is_zero(tmp_path):
     write_campaign(campaign(yaw=None), tmp_path)
     np.testing.assert_array_equal(read_campaign(tmp_path).yaw, np.zeros(len(ROLL)))
-    write_campaign(campaign(angles=None, sigma_angle=None, yaw=None), tmp_path)
+    write_campaign(campaign({"robot": None}, angles=None, yaw=None), tmp_path)
     assert read_campaign(tmp_path).yaw is None
 
 
@@ -181,17 +198,17 @@ def test_what_a_calibration_is_for_is_no_error(tmp_path, changes):
     assert_same(read_campaign(tmp_path), poor)
 
 
-@pytest.mark.parametrize(("changes", "part"), [
-    ({"name": "\ud800"}, "name"),
-    ({"unit": "counts"}, "nominal"),
-    ({"forces": np.full((8, 3), np.nan)}, "nan is no number"),
-    ({"time": np.arange(7)}, r"time: shape \(7,\), not \(8,\)"),
-    ({"angles": None}, "yaw"),
-    ({"sigma_angle": None}, "robot"),
+@pytest.mark.parametrize(("header", "changes", "part"), [
+    ({"name": "\ud800"}, {}, "name"),
+    ({"unit": "counts"}, {}, "nominal"),
+    ({"robot": None}, {}, "robot"),
+    ({}, {"forces": np.full((8, 3), np.nan)}, "nan is no number"),
+    ({}, {"time": np.arange(7)}, r"time: shape \(7,\), not \(8,\)"),
+    ({}, {"angles": None}, "yaw"),
 ])  # fmt: skip
-def test_what_could_not_be_read_again_is_not_written(tmp_path, changes, part):
+def test_what_could_not_be_read_again_is_not_written(tmp_path, header, changes, part):
     with pytest.raises(InputError, match=part):
-        write_campaign(campaign(**changes), tmp_path / "folder")
+        write_campaign(campaign(header, **changes), tmp_path / "folder")
     assert not (tmp_path / "folder").exists()
 
 
@@ -249,10 +266,10 @@ def test_unknown_columns_are_named_and_left_out(tmp_path):
 NO_NUMBER = ("abc", "9,8", "1_0", "", "nan", "1e999")
 
 
-@pytest.mark.parametrize("name", KNOWN)
+@pytest.mark.parametrize("name", KEYS)
 def test_a_wrong_cell_of_any_column_is_said_with_its_place(tmp_path, name):
     """It is no number, or beyond the range of the column; or the whole column is missing."""
-    (column,) = (each for each in COLUMNS.values() if name in each.names)
+    (column,) = (each for each in COLUMNS.values() if name in each.keys)
     least, most = column.within.least, column.within.most
     beyond = {f"{value:.17g}": "must be from" for value in (least - 1, 2 * most)}
     whole = {"2.5": "is no whole number"} if column.whole else {}
@@ -263,8 +280,8 @@ def test_a_wrong_cell_of_any_column_is_said_with_its_place(tmp_path, name):
         with refused(f"{tmp_path}/positions.csv: {name}: {place}: ", part):
             read_campaign(tmp_path)
     changed(tmp_path, {name: None})
-    if column.needed or column.names[1:]:
-        with refused(f"{name}: the column is missing", *({*column.names} - {name})):
+    if column.needed or column.keys[1:]:
+        with refused(f"{name}: the column is missing", *({*column.keys} - {name})):
             read_campaign(tmp_path)
     else:
         read_campaign(tmp_path)

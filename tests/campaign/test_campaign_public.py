@@ -51,7 +51,7 @@ def test_the_registry_says_how_a_file_is_read(name):
 def test_command(tmp_path):
     result = succeed("public", "mpu6050", "--out", tmp_path / "out", "--folder", DATA)
     assert "holds: 10" in result.output
-    assert read_campaign(tmp_path / "out").sensor == "MPU-6050"
+    assert read_campaign(tmp_path / "out").header.sensor == "MPU-6050"
     assert (tmp_path / "out" / "segmentation.png").exists()
 
 

@@ -2,11 +2,10 @@
 
 import math
 import re
-from dataclasses import replace
 
 import numpy as np
 import pytest
-from campaign_helpers import simulated_campaign
+from campaign_helpers import made, simulated_campaign
 from log_helpers import table
 from usual import GRAVITY, NINE
 
@@ -16,7 +15,6 @@ from accelstudy.basics.errors import InputError
 from accelstudy.campaign.calibration.fit import fit_campaign
 from accelstudy.campaign.calibration.sigma_check import check_sigmas
 from accelstudy.campaign.calibration.wording import interval_words, what_a_check_finds
-from accelstudy.campaign.session import Campaign
 from accelstudy.simulation.sessions import Noise
 
 G, SIGMA, SESSIONS = 9.81, 0.002, 4000
@@ -47,7 +45,7 @@ def check(errors, sigmas, needed):
 def test_the_intervals_of_a_calibration_hold_95_percent():
     """24 positions and 9 parameters: r = 15."""
     forces = sessions()
-    campaign = Campaign("one", np.arange(1, 25), forces[0], G)
+    campaign = made(forces[0], G)
     one = acs.calibrate(campaign, approach="gravity")
     fit, needed = one.fit, one.content["sigmas_95"]
     assert one.content["redundancy"] == 15
@@ -59,13 +57,13 @@ def test_the_intervals_of_a_calibration_hold_95_percent():
     truth = np.concatenate([BIAS, SCALE, np.zeros(3)])
     check(adjusted.parameters - truth, adjusted.sigma_posteriori, needed)
 
-    known = acs.calibrate(replace(campaign, sigma_force=SIGMA), approach="gravity")
+    known = acs.calibrate(campaign.with_sigma(SIGMA), approach="gravity")
     needed = known.content["sigmas_95"]
     assert needed == pytest.approx(1.96, abs=5e-5)
     inside = np.mean(np.abs(adjusted.parameters - truth) < needed * adjusted.sigma_priori, axis=0)
     assert np.abs(inside - 0.95).max() < 4.5 * ERROR
 
-    few = acs.calibrate(Campaign("few", np.arange(1, 14), forces[0, ::-1][:13], G))
+    few = acs.calibrate(made(forces[0, ::-1][:13], G))
     for calibration, said in ((few, "up to 2.78 sigmas"), (one, ""), (known, "")):  # r = 4
         leveled = calibration.apply(table([[0.1, 0.2, -9.8]]))
         warned = [warning for warning in leveled.attrs["warnings"] if "sigmas" in warning]
@@ -76,7 +74,7 @@ def test_the_intervals_of_a_calibration_hold_95_percent():
 def test_a_wrong_noise_does_not_show_in_simulation_and_is_said():
     """Each reading stands twice: its errors seem to be averaged, and the sigmas come out small."""
     once = simulated_campaign({"b_x": 0.1}, seed=4)
-    twice = Campaign("twice", np.arange(1, 49), np.repeat(once.forces, 2, axis=0), once.gravity)
+    twice = made(np.repeat(once.forces, 2, axis=0), once.gravity)
     honest, fooled = (fit_campaign(each, NINE, GRAVITY) for each in (once, twice))
     assert (fooled.sigma < 0.8 * honest.sigma).all()
     table = check_sigmas(fooled, replicates=1000, seed=3)
@@ -84,17 +82,17 @@ def test_a_wrong_noise_does_not_show_in_simulation_and_is_said():
     assert "No noise is stated" in what_a_check_finds(fooled)
     assert "no ratio can show" in what_a_check_finds(fooled)
     assert "the global test tells" in what_a_check_finds(honest)
-    refuted = replace(once, sigma_force=1e-4)
+    refuted = once.with_sigma(1e-4)
     assert "refute the stated noise" in what_a_check_finds(fit_campaign(refuted, NINE, GRAVITY))
     few = simulated_campaign({"b_x": 0.1}, scheme="d-optimal-9", noise=Noise(0.002))
     assert "nothing tells" in what_a_check_finds(fit_campaign(few, NINE, GRAVITY))
     with pytest.raises(InputError, match="no sigma to check"):
-        check_sigmas(fit_campaign(replace(few, sigma_force=None), NINE, GRAVITY))
+        check_sigmas(fit_campaign(few.with_sigma(None), NINE, GRAVITY))
 
 
 def test_the_interval_of_the_noise_holds():
     """Variances of r = 15 residuals, drawn: the interval of the noise holds 95 %."""
-    fit = fit_campaign(replace(simulated_campaign({}), sigma_force=None), NINE, GRAVITY)
+    fit = fit_campaign(simulated_campaign({}).with_sigma(None), NINE, GRAVITY)
     assert fit.adjustment.redundancy == 15
     low, high = re.search(
         r"from ([\d.]+) mm/s\^2 to ([\d.]+) mm/s\^2", what_a_check_finds(fit)

@@ -1,11 +1,11 @@
 """Gross errors: what is recognised, how it is undone, and what is refused."""
 
 import re
-from dataclasses import replace
 
 import gross
 import numpy as np
 import pytest
+from campaign_helpers import made, unaided
 
 import accelstudy as acs
 from accelstudy.basics.errors import InputError
@@ -18,7 +18,6 @@ from accelstudy.campaign.gross_errors.recognition import (
     recognise,
 )
 from accelstudy.campaign.header import LogLayout
-from accelstudy.campaign.session import Campaign
 from accelstudy.diagnosis.pipeline import diagnose
 from accelstudy.leveling.angles import angles_of
 from accelstudy.schemes import get_scheme
@@ -27,7 +26,7 @@ from accelstudy.sensors.frames import parse_frame
 from accelstudy.sensors.models import get_model
 
 CLEAN = acs.simulate_campaign(n_samples=50, yaw="random")
-BLIND = replace(CLEAN, angles=None, sigma_angle=None, yaw=None)
+BLIND = unaided(CLEAN)
 GRAVITY_20 = acs.simulate_campaign(scheme="fibonacci-20", approach="gravity")
 
 
@@ -47,7 +46,7 @@ def test_usual_wrong_units_are_refused(wrong, tmp_path):
 
 
 def test_other_checks_stay_without_plausibility(tmp_path):
-    broken = replace(CLEAN, forces=np.where(np.arange(3) == 1, np.nan, CLEAN.forces))
+    broken = CLEAN.with_arrays(forces=np.where(np.arange(3) == 1, np.nan, CLEAN.forces))
     with pytest.raises(InputError, match="fy: position 1: nan is no number"):
         write_campaign(broken, tmp_path, plausible=False)
 
@@ -76,13 +75,13 @@ def designs():
 def exchanged(campaign, rows, places):
     order = np.arange(campaign.n_positions)
     order[rows] = places
-    return replace(campaign, forces=campaign.forces[order])
+    return campaign.with_arrays(forces=campaign.forces[order])
 
 
 @pytest.mark.parametrize("design", DESIGNS)
 def test_nothing_is_recognised_where_nothing_is_wrong(design, designs):
     assert recognise(designs[design]) is None
-    assert recognise(replace(designs[design], angles=None), attitude=False) is None
+    assert recognise(unaided(designs[design]), attitude=False) is None
 
 
 @pytest.mark.parametrize("design", DESIGNS)
@@ -142,17 +141,15 @@ def test_columns_of_counts_are_exchanged_before_their_scales_and_offsets(differ,
     noise = 0.002 * np.random.default_rng(36).standard_normal(ideal.shape)
     forces = ideal * [1.004, 0.997, 1.006] + [0.12, -0.08, 0.2] + noise
     counts = nominal.from_si(forces)[:, columns]
-    read = Campaign(
-        **{"name": "counts", "positions": np.arange(1, 27), "forces": nominal.to_si(counts)},
-        **{"gravity": 9.80665, "sigma_force": 0.002, "unit": "counts", "nominal": nominal},
-        **({"angles": angles_of(ideal), "sigma_angle": 5e-5} if robot else {}),
-        log=LogLayout(unit="counts", scale=[*scale], offset=[*offset], frame=frame.name),
-    )
+    layout = LogLayout(unit="counts", scale=[*scale], offset=[*offset], frame=frame.name)
+    header = {"unit": "counts", "nominal": nominal.__dict__, "log": layout}
+    angles = {"angles": angles_of(ideal), "sigma_angle": 5e-5} if robot else {}
+    read = made(nominal.to_si(counts), sigma=0.002, header=header, **angles)
     found = recognise(read)
     assert re.match("axes are swapped: . is read as .*, in the counts, before", found.reason)
     np.testing.assert_allclose(found.corrected.forces, forces, atol=1e-12)
     # Readings in counts are converted, and then turned, as those of the campaign were.
-    log, logged = found.corrected.log, counts[:, np.argsort(frame.order)]
+    log, logged = found.corrected.header.log, counts[:, np.argsort(frame.order)]
     again = frame.to_frd(conversion_of(log.unit, log.scale, log.offset).to_si(logged))
     again = again @ found.matrix.T
     np.testing.assert_allclose(again, forces, atol=1e-12)
@@ -177,13 +174,12 @@ def test_a_sensor_that_is_mounted_in_its_own_way_is_no_gross_error(designs):
     for design in ("turned", "plain"):
         right = designs[design]
         turned = right.forces @ np.array([[c, s, 0], [-s, c, 0], [0, 0, 1]])
-        assert recognise(replace(right, forces=turned)) is None
+        assert recognise(right.with_arrays(forces=turned)) is None
 
 
 def test_several_gross_errors_are_undone_together(designs):
     right = designs["many"]
-    wrong = exchanged(right, [4, 9], [9, 4])
-    wrong.forces[20] += (3, -12, 8)
+    wrong = gross.bumped(exchanged(right, [4, 9], [9, 4]), 21, (3, -12, 8))
     wrong = gross.unit(gross.axes(wrong, 2, -1, 3), force=0.1019716212978)
     found = recognise(wrong)
     assert {name for name, _ in found.names} == {*GROSS_ERRORS}
@@ -201,7 +197,7 @@ def test_a_position_that_no_calibration_bears_is_left_out(approach, size):
     campaign = acs.simulate_campaign(scheme="fibonacci-24", seed=12, approach=approach)
     right = diagnose(campaign, get_model("bias-scale-nonorthogonality"))
     outward = campaign.forces[16] / np.linalg.norm(campaign.forces[16])
-    campaign.forces[16] += size * outward
+    campaign = gross.bumped(campaign, 17, size * outward)
     found = diagnose(campaign, get_model("bias-scale-nonorthogonality"))
     assert found.verdict == "gross_error"
     assert [(named.name, named.position) for named in found.found] == [("outlier_position", 17)]
@@ -212,7 +208,8 @@ def test_a_position_that_no_calibration_bears_is_left_out(approach, size):
 
 def test_of_many_wrong_positions_the_first_are_named():
     campaign = acs.simulate_campaign(scheme="fibonacci-200", seed=12, approach="gravity")
-    campaign.forces[::9] *= 1.5
+    factors = np.where(np.arange(200) % 9, 1.0, 1.5)[:, None]
+    campaign = campaign.with_arrays(forces=campaign.forces * factors)
     with pytest.raises(InputError, match=r"positions 1, 10, .*, 172, … are wrong by up to") as e:
         acs.calibrate(campaign)
     assert len(str(e.value)) < 400
@@ -227,5 +224,5 @@ def test_a_bias_that_no_sensor_has_is_not_taken_for_bumped_positions():
         forces = STANDARD_GRAVITY * (up + np.array([0.48, 0, 0])) + 0.002 * rng.standard_normal(
             up.shape
         )
-        campaign = replace(GRAVITY_20, forces=forces)
+        campaign = GRAVITY_20.with_arrays(forces=forces)
         assert recognise(campaign, attitude=False) is None

@@ -63,7 +63,7 @@ def test_means():
 def test_means_with_units_in_their_names_and_as_columns_of_an_array(tmp_path):
     names = {f"f{axis}": f"f{axis} [g]" for axis in "xyz"}
     campaign = acs.find_holds(table(np.eye(3)).rename(columns=names), means=True)
-    assert campaign.unit == "g"
+    assert campaign.header.unit == "g"
     np.testing.assert_allclose(campaign.forces, np.eye(3) * STANDARD_GRAVITY)
     savemat(tmp_path / "means.mat", {"means": np.random.default_rng(1).normal(0, 1, (3, 24))})
     campaign = acs.find_holds(tmp_path / "means.mat", means=True, unit="g")
@@ -108,6 +108,6 @@ def test_command_with_everything(tmp_path):
     assert "threshold: 0.1 m/s², as given" in result.stdout
     campaign = read_campaign(tmp_path / "out")
     assert campaign.n_positions == 4
-    assert campaign.sensor == "A-1"
+    assert campaign.header.sensor == "A-1"
     np.testing.assert_allclose(np.linalg.norm(campaign.forces, axis=1), G, atol=0.01)
     assert not (tmp_path / "out" / "segmentation.svg").exists()

@@ -82,16 +82,16 @@ def test_frames(turned, unit):
     expected = acs.find_holds(table(forces), rate=RATE)
     np.testing.assert_allclose(found.forces, expected.forces, rtol=1e-9)
     np.testing.assert_allclose(found.sd, expected.sd, rtol=1e-9)
-    assert found.log.frame == "flu"
+    assert found.header.log.frame == "flu"
     if unit == "counts":
-        np.testing.assert_array_equal(found.nominal.scale, [0.001, -0.002, -0.003])
+        np.testing.assert_array_equal(found.header.nominal.scale, [0.001, -0.002, -0.003])
 
 
 def test_numbers_with_a_scale_are_counts(turned):
     raw = turned[0] / 0.001
     expected = acs.find_holds(table(raw), rate=RATE, unit="counts", scale=0.001)
     found = acs.find_holds(table(raw), rate=RATE, scale=0.001)
-    assert found.unit == expected.unit == "counts"
+    assert found.header.unit == expected.header.unit == "counts"
     np.testing.assert_array_equal(found.forces, expected.forces)
     with pytest.raises(InputError, match="goes with unit counts, not g"):
         acs.find_holds(table(raw), rate=RATE, unit="g", scale=0.001)
@@ -106,7 +106,7 @@ def test_temperature_vibration_and_range(turned):
     how = {"rate": RATE, "columns": "vibration=shake", "range": f"{limit / 9.80665:.6f}g"}
     campaign = acs.find_holds(table(forces, temp=warm, shake=0.3), **how)
     assert any("left out: the sensor is saturated there" in text for text in campaign.warnings)
-    assert campaign.full_range == pytest.approx(limit, rel=1e-5)
+    assert campaign.header.range_mps2 == pytest.approx(limit, rel=1e-5)
     assert campaign.n_positions < len(edges)
     expected = 10 + 10 * campaign.time * RATE / (n - 1)
     np.testing.assert_allclose(campaign.temperature, expected, atol=0.05)
@@ -145,7 +145,7 @@ def test_sigma_does_not_depend_on_the_offset():
         assert holds.noise.directed
         np.testing.assert_allclose(np.linalg.norm(campaign.forces, axis=1), 9.8, atol=2)
         if offset is None:
-            np.testing.assert_allclose(campaign.nominal.offset, right, atol=10)
+            np.testing.assert_allclose(campaign.header.nominal.offset, right, atol=10)
             assert any("from the positions, as none was given" in note for note in campaign.notes)
     np.testing.assert_allclose(sigmas, sigmas[0], rtol=0.01)
 
@@ -176,7 +176,7 @@ def test_holds_are_left_out_by_number(tmp_path, turned):
     campaign = read_campaign(tmp_path / "out")
     assert campaign.positions.tolist() == [1, 3, 4, 5, 6, 8]
     assert campaign.reasons == {2: "moved", 7: "somebody passed"}
-    assert len(campaign.left_out["positions"]) == 2
+    assert len(campaign.holds) == 8
     assert "2 left out" in (tmp_path / "out" / "segmentation.svg").read_text()
 
 
@@ -226,9 +226,9 @@ def test_means_with_a_robot(frame, unit):
     campaign = acs.find_holds(log, robot_sigma="3.2mgon", robot_unit=unit, **how)
     np.testing.assert_allclose(campaign.angles, np.column_stack([roll, pitch]), atol=1e-12)
     np.testing.assert_allclose(campaign.yaw, yaw, atol=1e-12)
-    assert campaign.sigma_angle == pytest.approx(3.2 * MGON)
+    assert campaign.header.sigma_angle == pytest.approx(3.2 * MGON)
     # Of a log it tells the axes, and not the columns.
-    assert campaign.log == LogLayout(frame=frame)
+    assert campaign.header.log == LogLayout(frame=frame)
     np.testing.assert_allclose(campaign.forces, forces, atol=1e-12)
     wrong, right = "rad" if unit != "rad" else "gon", {"deg": "degrees", "rad": "radians"}
     with refused(f"the robot's angles are in {right.get(unit, unit)}, not in {wrong}"):

@@ -76,15 +76,15 @@ def imported(plate, beside="ref.csv", calibration="ref/calibration.json", **how)
 def test_from_two_logs_to_the_sensor(plate):
     campaign = imported(plate)
     assert "x right, y back, z down" in " ".join(campaign.notes)
-    assert campaign.reference.frame == "rbd"
-    assert campaign.reference.calibration == "alone"
+    assert campaign.header.reference.frame == "rbd"
+    assert campaign.header.reference.calibration == "alone"
     # Four seconds less trims and half windows, at 25 per second.
-    assert campaign.reference.sigma_mps2 == pytest.approx(0.01 / np.sqrt(70), rel=0.4)
+    assert campaign.header.reference.sigma_mps2 == pytest.approx(0.01 / np.sqrt(70), rel=0.4)
     calibration = acs.calibrate(
         campaign, approach="robot", model="bias-scale-nonorthogonality-crossaxis"
     )
     # Fourteen holds of four seconds hardly tell their own noise, so nothing is accepted by it.
-    assert campaign.sigma_dof < 8
+    assert campaign.header.sigma_dof < 8
     assert calibration.state == "cannot tell"
     assert calibration.content["reference"]["calibration"] == "alone"
     tilt = calibration.content["quality"]["tilt_rms_mgon"]

@@ -77,9 +77,9 @@ def test_the_step_is_said_kept_and_counts_in_the_verdict(tmp_path, step):
     assert "does not change" not in result.output
     campaign = read_campaign(tmp_path / "c")
     if step < 0.1:
-        assert campaign.resolution is None
+        assert campaign.header.resolution_mps2 is None
         return
-    np.testing.assert_allclose(campaign.resolution, 0.1)
+    np.testing.assert_allclose(campaign.header.resolution_mps2, 0.1)
     # Noise of 20 mm/s² lets some 10 of the 29 mm/s² of plain rounding through.
     assert 0.007 < campaign.sigma_force < 0.014
     calibrated = succeed("calibrate", tmp_path / "c", "--out", tmp_path / "r").output

@@ -119,7 +119,7 @@ def test_names_with_units(names, factor, unit):
     log = table(forces=FORCES * factor, names=names, **turns)
     campaign = found(log)
     assert f"({unit})" in said(campaign)
-    assert campaign.unit == unit
+    assert campaign.header.unit == unit
     applied = acs.calibrate(campaign).apply(log)
     # Rows at rest have the length of gravity.
     norm = np.linalg.norm(applied[[f"f{a}_calibrated_mps2" for a in "xyz"]], axis=1)
@@ -263,7 +263,7 @@ def folder(tmp_path_factory):
 def test_a_recording_has_forces_temperatures_and_axes(folder, name, settings, turn, frame):
     campaign = found(acs.read_log(folder / name, **settings), turn)
     assert_timed(campaign)
-    assert campaign.log.frame == frame
+    assert campaign.header.log.frame == frame
     if "one" in name:
         np.testing.assert_allclose(campaign.temperature, 20 + campaign.time / 20, atol=0.05)
 

@@ -7,13 +7,12 @@ import pandas as pd
 import pytest
 import yaml
 from calling import refusal, succeed
-from campaign_helpers import FIVE_AXES
+from campaign_helpers import FIVE_AXES, made
 from page_helpers import text_of
 
 import accelstudy as acs
 from accelstudy.basics.units import GON, MGON
 from accelstudy.campaign.format import write_campaign
-from accelstudy.campaign.session import Campaign
 from accelstudy.data_sheets import sheet_of_sigma
 from accelstudy.leveling.error import cap_forces
 from accelstudy.planning.candidates import in_scheme
@@ -29,8 +28,7 @@ def written(folder, directions, seed, outside=None):
     noise = 0.002 * np.random.default_rng(seed).standard_normal(directions.shape)
     forces = -9.80665 * directions * [1.004, 0.997, 1.006] + [0.12, -0.08, 0.2] + noise
     forces += 0 if outside is None else outside(directions)
-    numbers = np.arange(1, len(forces) + 1)
-    write_campaign(Campaign("made-up", numbers, forces, 9.80665, sigma_force=0.002), folder)
+    write_campaign(made(forces, sigma=0.002), folder)
     return folder
 
 

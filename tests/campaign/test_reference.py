@@ -5,6 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from calling import refused
+from campaign_helpers import made
 from usual import GRAVITY, NINE, ROBOT, TWELVE, G
 
 from accelstudy.adjustment import Observations, calibrate
@@ -13,7 +14,6 @@ from accelstudy.campaign.calibration.fit import campaign_observations, fit_campa
 from accelstudy.campaign.calibration.sigma_check import check_sigmas
 from accelstudy.campaign.format import read_campaign, write_campaign
 from accelstudy.campaign.reference import ReferenceSensor
-from accelstudy.campaign.session import Campaign
 from accelstudy.diagnosis.next_positions import candidate_rows
 from accelstudy.diagnosis.space.frame import SessionFit
 from accelstudy.leveling.angles import angles_of
@@ -56,16 +56,7 @@ def sessions(covariance, count, seed, frame="frd"):
         measured = TWELVE.sense(forces, truth) + NOISE * rng.standard_normal(forces.shape)
         yield (
             truth,
-            Campaign(
-                name="beside",
-                positions=np.arange(1, 21),
-                forces=measured,
-                gravity=G,
-                sigma_force=NOISE,
-                angles=angles,
-                sigma_angle=NOISE_OF_REFERENCE / G,
-                reference=beside,
-            ),
+            made(measured, G, NOISE, angles=angles, header={"reference": beside}),
         )
 
 
@@ -94,7 +85,7 @@ def campaign(known):
 
 def test_common_errors_are_those_of_changed_parameters(campaign):
     """J L by the package, against roll and pitch with a calibration that is changed a little."""
-    beside, angles = campaign.reference, campaign.angles
+    beside, angles = campaign.header.reference, campaign.angles
     _, common = beside.errors(angles, G)
     own = beside.axes.from_frd(G * np.column_stack(_directions(angles)))
     p = np.array(beside.parameters)
@@ -162,7 +153,7 @@ HEADERS = [
 def test_a_header_with_a_reference_is_read_again_and_a_wrong_one_refused(campaign, tmp_path):
     write_campaign(campaign, tmp_path)
     again = read_campaign(tmp_path)
-    assert again.reference == campaign.reference
+    assert again.header.reference == campaign.header.reference
     np.testing.assert_allclose(again.angles, campaign.angles, rtol=1e-13)
     header, table = tmp_path / "campaign.yaml", tmp_path / "positions.csv"
     text = header.read_text()

@@ -2,10 +2,10 @@
 
 import numpy as np
 import pytest
+from campaign_helpers import made
 
 from accelstudy.approaches import get_approach
 from accelstudy.basics.units import STANDARD_GRAVITY
-from accelstudy.campaign.session import Campaign
 from accelstudy.diagnosis.decision.problem import fit_base, pose
 from accelstudy.diagnosis.decision.refits import best_refit, with_settings
 from accelstudy.diagnosis.evidence.bounds import box_probability
@@ -25,13 +25,7 @@ def saturated(k, knee, seed):
     force = G * directions / np.linalg.norm(directions, axis=1, keepdims=True)
     read = BIAS + (1 + SCALE) * force
     read -= k * np.sign(read) * np.maximum(np.abs(read) - knee, 0)
-    return Campaign(
-        name="saturated",
-        positions=np.arange(N),
-        forces=read + SIGMA * rng.standard_normal((N, 3)),
-        gravity=G,
-        sigma_force=SIGMA,
-    )
+    return made(read + SIGMA * rng.standard_normal((N, 3)), G, SIGMA)
 
 
 def weighed(campaign):

@@ -1,7 +1,5 @@
 """What is certain beside what is open: on sessions made here, by formulas of this file."""
 
-from dataclasses import replace
-
 import numpy as np
 import pytest
 from usual import NINE, G
@@ -24,7 +22,7 @@ def session(n, rng, approach="gravity"):
     if campaign.angles is not None:
         up = np.column_stack(specific_force(*campaign.angles.T, G))
     axes = np.eye(3) + 0.01 * np.triu(rng.uniform(-1, 1, (3, 3)))
-    return replace(campaign, forces=up @ axes.T + rng.uniform(-0.3, 0.3, 3)), up
+    return campaign.with_arrays(forces=up @ axes.T + rng.uniform(-0.3, 0.3, 3)), up
 
 
 def test_a_warm_up_is_certain_whatever_is_open_beside_it():
@@ -35,7 +33,8 @@ def test_a_warm_up_is_certain_whatever_is_open_beside_it():
     w *= 0.06 / np.linalg.norm(w)
     course = 0.85 * np.exp(-campaign.time / 280) + 0.15 * np.exp(-campaign.time / 900)
     forces = campaign.forces + np.outer(course, w) + 1.5e-3 * k / np.linalg.norm(k) * up**2 / G
-    found = diagnose(replace(campaign, forces=forces + 1.5e-3 * rng.standard_normal((36, 3))), NINE)
+    forces += 1.5e-3 * rng.standard_normal((36, 3))
+    found = diagnose(campaign.with_arrays(forces=forces), NINE)
     assert found.verdict == "unknown"
     assert found.effects == ()
     assert [name.name for name in found.certain[0].names] == ["warm_up"]
@@ -53,7 +52,7 @@ def test_what_an_effect_only_imitates_is_not_certain():
         campaign, up = session(36, rng, "robot")
         ripple = 0.02 * np.sin(3 * np.pi * up / G + rng.uniform(0, 2 * np.pi, 3))
         forces = campaign.forces + ripple + 1e-3 * rng.standard_normal((36, 3))
-        found = diagnose(replace(campaign, forces=forces), NINE)
+        found = diagnose(campaign.with_arrays(forces=forces), NINE)
         assert [one.name for one in found.found] == ["learned"]
         assert found.place == ("force", "bias")
 
@@ -63,7 +62,7 @@ def with_ramp(campaign, first, last):
     n = len(campaign.forces)
     temperature = np.interp(np.arange(n), [first, last], [20.0, 40.0])
     inside = (np.arange(n) > first) & (np.arange(n) < last)
-    return replace(campaign, temperature=temperature), np.where(inside, 1.0, 0.0)
+    return campaign.with_arrays(temperature=temperature), np.where(inside, 1.0, 0.0)
 
 
 @pytest.mark.parametrize("approach", ["gravity", "robot"])
@@ -75,7 +74,7 @@ def test_what_a_rate_of_temperature_does_is_no_bumped_position(approach):
         bias = rng.standard_normal(3)
         bias *= 0.03 / np.linalg.norm(bias)
         forces = campaign.forces + np.outer(rate, bias) + 1e-3 * rng.standard_normal((36, 3))
-        found = diagnose(replace(campaign, forces=forces), NINE)
+        found = diagnose(campaign.with_arrays(forces=forces), NINE)
         assert found.verdict in ("unknown", "learned")
         assert found.credible_set[0].names[-1] == "unknown"
         # By gravity the three holds of the ramp have one condition each, for a bias as for angles.
@@ -99,14 +98,14 @@ def test_exchanged_axes_are_recognised_in_poor_data(spoil, axes):
     rng = np.random.default_rng([24, *axes])
     campaign, _ = session(24, rng, "robot")
     poor = SPOILS[spoil](campaign.forces, rng)
-    assert "axis_error" not in str(recognise(replace(campaign, forces=poor)))
-    found = recognise(replace(campaign, forces=poor[:, axes]))
+    assert "axis_error" not in str(recognise(campaign.with_arrays(forces=poor)))
+    found = recognise(campaign.with_arrays(forces=poor[:, axes]))
     np.testing.assert_array_equal(found.matrix, np.eye(3)[:, axes])
 
 
 def test_exchanged_angles_of_the_robot_are_recognised():
     campaign, _ = session(24, np.random.default_rng(25), "robot")
-    found = recognise(replace(campaign, angles=campaign.angles[:, ::-1].copy()))
+    found = recognise(campaign.with_arrays(angles=campaign.angles[:, ::-1]))
     assert found.reason == "roll and pitch of the robot are exchanged"
     np.testing.assert_array_equal(found.corrected.angles, campaign.angles)
 
@@ -117,5 +116,5 @@ def test_a_diagnosis_that_has_no_solution_does_not_advise_a_diagnosis():
     campaign, _ = session(24, rng, "robot")
     other, _ = session(24, rng)
     with pytest.raises(InputError, match="does not converge") as error:
-        diagnose(replace(campaign, forces=other.forces), NINE)
+        diagnose(campaign.with_arrays(forces=other.forces), NINE)
     assert "accelstudy diagnose" not in str(error.value)

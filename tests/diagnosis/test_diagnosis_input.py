@@ -1,7 +1,6 @@
 """Bad and odd input of a diagnosis: it works sensibly, or says in one line why not."""
 
 import json
-from dataclasses import replace
 from functools import partial
 
 import gross
@@ -16,6 +15,7 @@ from usual import GRAVITY, NINE, ROBOT
 
 import accelstudy as acs
 from accelstudy.basics.errors import InputError
+from accelstudy.basics.units import MGON
 from accelstudy.campaign.format import write_campaign
 from accelstudy.diagnosis.pipeline import diagnose
 from accelstudy.diagnosis.report.file_format import DiagnosisDocument
@@ -24,7 +24,6 @@ from accelstudy.diagnosis.report.words import verdict_lines
 from accelstudy.diagnosis.visibility import examine_campaign
 from accelstudy.effects import effect_names
 from accelstudy.leveling.angles import specific_force
-from accelstudy.sensors.conversion import Conversion
 
 N = 36
 
@@ -56,13 +55,14 @@ def document(folder, *changed):
 
 # A radian of the robot against 1e-9 m/s²: their variances differ by more than 1e16.
 @pytest.mark.parametrize(("keys", "sigmas", "said"), [
-    ({}, {"sigma_force": 1e-9, "sigma_angle": 1.0}, "sensor_noise.sigma_mps2"),
+    ({}, {"sensor_noise": {"sigma_mps2": 1e-9}, "robot": {"angle_sigma_mgon": 6e4}},
+     "sensor_noise.sigma_mps2"),
     ({"scheme": "faces-6", "approach": "gravity", "repeat_first": 0}, {}, "do not determine"),
     ({"scheme": "d-optimal-9", "approach": "gravity", "repeat_first": 0}, {}, "no redundancy"),
 ])  # fmt: skip
 def test_what_cannot_be_diagnosed_is_one_line(keys, sigmas, said, tmp_path):
     """Whatever else is bad in a campaign, the tests of its format have."""
-    assert said in refusal(*words(tmp_path, replace(campaign(**keys), **sigmas)))
+    assert said in refusal(*words(tmp_path, campaign(**keys).with_header(**sigmas)))
     assert not (tmp_path / "out").exists()
 
 
@@ -85,7 +85,7 @@ def test_what_needs_a_missing_column_is_untestable_with_the_reason(robot, tmp_pa
 
 
 def test_what_does_not_change_shows_nothing(robot, tmp_path):
-    still = replace(robot, temperature=np.full(N, 20.0), vibration=np.ones(N), time=np.zeros(N))
+    still = robot.with_arrays(temperature=np.full(N, 20.0), vibration=np.ones(N), time=np.zeros(N))
     hidden = {
         *("thermal_bias", "thermal_scale", "vibration_rectification", "gravity_error"),
         *("bias_drift", "bias_jump", "warm_up", "thermal_curve", "mounting_slip"),
@@ -101,7 +101,7 @@ def test_what_does_not_change_shows_nothing(robot, tmp_path):
 def test_no_effect_is_silently_absent(gravity):
     """Every effect is in the model, tested, invisible, or untestable with the reason."""
     few = acs.simulate_campaign(scheme="icosahedron-12", approach="gravity")
-    for measured in (gravity, few, replace(gravity, temperature=None, time=None)):
+    for measured in (gravity, few, gravity.with_arrays(temperature=None, time=None)):
         seen = examine_campaign(measured, NINE).tested
         tested = {*seen.shapes}
         listed = [*seen.invisible, *seen.untestable]
@@ -113,8 +113,8 @@ def test_no_effect_is_silently_absent(gravity):
 
 def test_counts_that_are_coarse_are_named_as_such(robot, tmp_path):
     """0.0236 m/s² a count and 0.002 m/s² of noise: the step is found as it is."""
-    scale = np.full(3, 0.0236)
-    counts = replace(robot, unit="counts", nominal=Conversion(scale, np.full(3, 33000.0)))
+    nominal = {"scale": [0.0236] * 3, "offset": [33000.0] * 3}
+    counts = robot.with_header(unit="counts", nominal=nominal)
     whole = {f: lambda t, f=f: t[f].round() for f in ("fx", "fy", "fz")}
     found, _ = document(tmp_path, counts, lambda t: t.assign(**whole))
     assert found["effects"][0]["name"] == "quantisation"
@@ -124,7 +124,7 @@ def test_counts_that_are_coarse_are_named_as_such(robot, tmp_path):
 @pytest.mark.parametrize(("repeat_first", "sigma_angle"), [(0, 0.0), (1, 1e-9)])
 def test_one_repeat_or_none_is_enough_and_no_robot_too_good(repeat_first, sigma_angle):
     measured = campaign(repeat_first=repeat_first)
-    found = diagnose(replace(measured, sigma_angle=sigma_angle), NINE)
+    found = diagnose(measured.with_header(robot={"angle_sigma_mgon": sigma_angle / MGON}), NINE)
     assert found.verdict == "no_effect"
     assert (found.problem.attitude is not None) == (repeat_first > 0)
 
@@ -149,7 +149,7 @@ def test_no_effect_is_named_in_what_is_its_own_model(robot, approach, digits):
     truth = np.array([0.05, -0.02, 0.03, 2e-3, -1e-3, 1e-3, 1e-3, -2e-3, 1e-3])
     f_b = np.column_stack(specific_force(*robot.angles.T, robot.gravity))
     forces = NINE.sense(f_b, truth, robot.gravity, robot.hold)
-    measured = replace(robot, forces=np.round(forces, digits))
+    measured = robot.with_arrays(forces=np.round(forces, digits))
     found = Diagnosis(diagnose(measured, NINE, approach)).content
     assert found["verdict"] in {"no_effect", "noise_model"}
     assert found["gap"]["sigma0_squared"]["before"] < 1e-6
@@ -157,7 +157,7 @@ def test_no_effect_is_named_in_what_is_its_own_model(robot, approach, digits):
 
 @pytest.mark.parametrize(("approach", "sigma"), [(ROBOT, 1e-6), (GRAVITY, 1e3)])
 def test_a_sigma_out_of_all_bounds_is_the_noise(robot, sigma, approach):
-    found = Diagnosis(diagnose(replace(robot, sigma_force=sigma), NINE, approach)).content
+    found = Diagnosis(diagnose(robot.with_sigma(sigma), NINE, approach)).content
     assert found["verdict"] == "noise_model"
     assert found["noise"]["sigma_source"] == "residuals"
 

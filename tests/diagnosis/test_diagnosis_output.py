@@ -70,7 +70,7 @@ def simulated(case, folder):
     campaign = acs.simulate_campaign(name=case, **settings)
     if case == "learned":
         turn = np.sin(np.asarray(campaign.yaw))[:, None]
-        campaign = replace(campaign, forces=campaign.forces + turn * np.array([8e-3, 0, 0]))
+        campaign = campaign.with_arrays(forces=campaign.forces + turn * np.array([8e-3, 0, 0]))
     if case == "gross_error":
         campaign = gross.rows(gross.axes(campaign, 2, 1, 3), 3, 9)
     write_campaign(campaign, folder, plausible=False)
@@ -260,7 +260,7 @@ def test_positions_say_what_was_held_out(written):
 @pytest.mark.usefixtures("composed")
 def test_a_bumped_position_is_left_out(tmp_path):
     campaign = simulated("no_effect", tmp_path / "c")
-    campaign.forces[7] += (0.05, -0.04, 0.06)
+    campaign = gross.bumped(campaign, 8, (0.05, -0.04, 0.06))
     diagnosis = diagnose(campaign, NINE)
     content = write_diagnosis(diagnosis, tmp_path / "out")
     (effect,) = content["effects"]
@@ -284,7 +284,7 @@ def simulated_sessions(simulated, fitted, d, count=200):
     f_b = simulated.model.correct(d.campaign.forces, p, G, d.frame.hold)
     directions = -f_b / np.linalg.norm(f_b, axis=1, keepdims=True)
     ideal = session(simulated.model, p, directions, G, d.frame.hold)
-    noise = Noise(d.campaign.sigma_force, d.campaign.sigma_angle)
+    noise = Noise(d.campaign.sigma_force, d.campaign.header.sigma_angle)
     drawn = ideal.draw(noise, count, np.random.default_rng(1))
     initial = fitted.parameters[: fitted.model.n_parameters]
     result = calibrate(fitted.model, d.approach, replace(drawn, initial=initial))

@@ -109,5 +109,5 @@ def test_the_limit_of_a_parameter_holds_where_no_noise_is_stated():
 def test_a_sensor_whose_range_is_far_beyond_gravity_does_not_saturate():
     measured = campaign(3)
     assert "saturation" in examine_campaign(measured, NINE).candidates
-    wide = examine_campaign(replace(measured, full_range=8 * G), NINE)
+    wide = examine_campaign(measured.with_header(range_mps2=8 * G), NINE)
     assert wide.tested.invisible == ("gravity_error", "saturation")

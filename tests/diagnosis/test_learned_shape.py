@@ -1,13 +1,11 @@
 """A learned function: its table, its figure, and what is said of it."""
 
-from dataclasses import replace
-
 import numpy as np
 import pytest
+from campaign_helpers import made
 from usual import NINE, G
 
 from accelstudy.basics.units import MGON
-from accelstudy.campaign.session import Campaign
 from accelstudy.diagnosis.pipeline import diagnose
 from accelstudy.diagnosis.report.document import shape_document
 from accelstudy.diagnosis.report.figures import AXES, shape_figure
@@ -26,12 +24,10 @@ def plain_campaign(rng):
     f = -G * rng.permutation(directions)
     roll, pitch = np.arctan2(-f[:, 1], -f[:, 2]), np.arctan2(f[:, 0], np.hypot(f[:, 1], f[:, 2]))
     sigma_angle = 10 * MGON
-    return Campaign(
-        name="plain",
-        positions=np.arange(1, N + 1),
-        forces=f + SIGMA * rng.standard_normal((N, 3)),
-        gravity=G,
-        sigma_force=SIGMA,
+    return made(
+        f + SIGMA * rng.standard_normal((N, 3)),
+        G,
+        SIGMA,
         angles=np.column_stack([roll, pitch]) + sigma_angle * rng.standard_normal((N, 2)),
         sigma_angle=sigma_angle,
         time=60.0 * np.arange(N),
@@ -50,7 +46,8 @@ def learned():
     """The bias of x and y depends on the yaw, once per turn."""
     campaign, _ = plain_campaign(np.random.default_rng(5))
     turn = np.sin(np.asarray(campaign.yaw) + PHASE)[:, None]
-    changed = replace(campaign, forces=campaign.forces + turn * np.array([SWING, 0.7 * SWING, 0]))
+    swings = turn * np.array([SWING, 0.7 * SWING, 0])
+    changed = campaign.with_arrays(forces=campaign.forces + swings)
     return diagnose(changed, NINE)
 
 

@@ -1,13 +1,12 @@
 """A cause that nobody recorded: what is said where a thermometer or a clock is absent."""
 
 import json
-from dataclasses import replace
 
 import numpy as np
 import pytest
+from campaign_helpers import made
 from usual import NINE, G
 
-from accelstudy.campaign.session import Campaign
 from accelstudy.diagnosis.pipeline import diagnose
 from accelstudy.diagnosis.report.output import Diagnosis
 from accelstudy.diagnosis.report.words import verdict_lines
@@ -18,7 +17,7 @@ CANNOT = (
 )
 
 
-def session(course, seed=1, n=40, size=6.0, robot=True, sigma=0.002, **columns):
+def session(course, seed=1, n=40, size=6.0, robot=True, sigma=0.002, stated=True, **columns):
     """A session of own formulas: an affine sensor whose biases follow a course of the time.
 
     Parameters
@@ -36,8 +35,7 @@ def session(course, seed=1, n=40, size=6.0, robot=True, sigma=0.002, **columns):
     angles = np.column_stack([np.arctan2(-y, -z), np.arctan2(x, np.hypot(y, z))])
     read = 1.004 * force.T + [0.1, -0.05, 0.2] + moved + sigma * rng.standard_normal((n, 3))
     rig = {"angles": angles, "sigma_angle": 1e-6} if robot else {}
-    columns = {"time": time, "sigma_force": sigma, **rig, **columns}
-    return Campaign("wanders", np.arange(1, n + 1), read, G, **columns)
+    return made(read, G, sigma if stated else None, **{"time": time, **rig, **columns})
 
 
 def wandering(t):
@@ -46,7 +44,7 @@ def wandering(t):
 
 
 @pytest.mark.parametrize(("robot", "columns"), [
-    (True, {}), (False, {"sigma_force": None}), (True, {"time": None}),
+    (True, {}), (False, {"stated": False}), (True, {"time": None}),
 ])  # fmt: skip
 def test_what_nobody_recorded_is_a_function_of_time(robot, columns):
     """Not noise: with the function in the model the sensor levels as the noise allows."""
@@ -74,7 +72,7 @@ def test_a_course_that_a_thermometer_shows_is_an_effect():
     """The same session, with its temperature."""
     measured = session(wandering)
     t = measured.time / measured.time[-1]
-    found = diagnose(replace(measured, temperature=20 + 3 * wandering(t)), NINE)
+    found = diagnose(measured.with_arrays(temperature=20 + 3 * wandering(t)), NINE)
     assert (found.verdict, found.found[0].name) == ("named", "thermal_bias")
     assert found.code != "unrecorded"
     assert found.p_coloured == 0

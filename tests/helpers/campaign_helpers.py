@@ -3,6 +3,7 @@
 import numpy as np
 from usual import NINE
 
+from accelstudy.basics.units import MGON, STANDARD_GRAVITY
 from accelstudy.campaign.session import Campaign
 from accelstudy.schemes import get_scheme
 from accelstudy.simulation.sessions import Noise, session
@@ -18,13 +19,22 @@ def simulated_campaign(values, scheme="mclaren-24", seed=1, noise=None, sigma=0.
     noise = noise or Noise(sigma_force=sigma)
     simulated = session(NINE, NINE.vector(values), get_scheme(scheme).directions)
     drawn = simulated.draw(noise, 1, np.random.default_rng(seed))
-    n = len(simulated.forces)
-    return Campaign(
-        name="simulated",
-        positions=np.arange(1, n + 1),
-        forces=drawn.forces[0],
-        gravity=simulated.gravity,
-        sigma_force=sigma,
-        angles=drawn.angles[0],
-        sigma_angle=noise.sigma_angle,
-    )
+    angles = {"angles": drawn.angles[0], "sigma_angle": noise.sigma_angle}
+    return made(drawn.forces[0], simulated.gravity, sigma, name="simulated", **angles)
+
+
+def made(forces, gravity=STANDARD_GRAVITY, sigma=None, sigma_angle=None, header=(), name="made",
+         **arrays):  # fmt: skip
+    """A campaign of forces and of other arrays in SI, with other keys of the header."""
+    content = {
+        "name": name,
+        "gravity": {"value_mps2": gravity},
+        "sensor_noise": None if sigma is None else {"sigma_mps2": sigma},
+        "robot": None if sigma_angle is None else {"angle_sigma_mgon": sigma_angle / MGON},
+    }
+    return Campaign.of({**content, **dict(header)}, forces=forces, **arrays)
+
+
+def unaided(campaign):
+    """The campaign without its robot."""
+    return campaign.with_header(robot=None).with_arrays(angles=None, yaw=None)

@@ -1,14 +1,12 @@
 """Gross errors that tests put into the data of a campaign, by formulas of their own."""
 
-from dataclasses import replace
-
 import numpy as np
 
 
 def of_readings(campaign, change):
     """Change all columns of what the sensor reads, (n, 3) each; sds have no sign."""
     sd = None if campaign.sd is None else np.abs(change(campaign.sd))
-    return replace(campaign, forces=change(campaign.forces), sd=sd)
+    return campaign.with_arrays(forces=change(campaign.forces), sd=sd)
 
 
 def axes(campaign, x, y, z):
@@ -21,7 +19,7 @@ def unit(campaign, force=1.0, angle=1.0):
     """The numbers of the forces, or of the robot's angles, are wrong by a factor."""
     wrong = of_readings(campaign, lambda v: force * v)
     columns = {name: getattr(campaign, name) for name in ("angles", "yaw")}
-    return replace(wrong, **{k: angle * v for k, v in columns.items() if v is not None})
+    return wrong.with_arrays(**{k: angle * v for k, v in columns.items() if v is not None})
 
 
 def rows(campaign, first, second):
@@ -35,4 +33,4 @@ def bumped(campaign, position, error=(0.0, 0.1, 0.0)):
     """The mean of a position is wrong by a vector, m/s²."""
     forces = campaign.forces.copy()
     forces[position - 1] += error
-    return replace(campaign, forces=forces)
+    return campaign.with_arrays(forces=forces)

@@ -1,7 +1,6 @@
 """What the page about public measurements quotes of them: diagnoses, limits, and other numbers."""
 
 from collections.abc import Iterator
-from dataclasses import replace
 from functools import cache
 
 import numpy as np
@@ -67,9 +66,9 @@ def imported(name):
 def diagnosed(name: str, sigma: str = "") -> CampaignDiagnosis:
     campaign, _ = imported(name)
     if sigma == WHITE:
-        campaign = replace(campaign, sigma_force=0.000296, sigma_dof=None)
+        campaign = campaign.with_sigma(0.000296)
     elif sigma == UNKNOWN:
-        campaign = replace(campaign, sigma_force=None, sigma_dof=None)
+        campaign = campaign.with_sigma(None)
     return diagnose(campaign, NINE)
 
 

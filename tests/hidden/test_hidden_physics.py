@@ -75,7 +75,7 @@ def misfit_without_noise(case, kind, seed):
     cause = Cause(kind, effect.settings, np.array([effect.parameters]))
     forces, angles = observe(session(case.design), sensor, [cause])
     robot = None if campaign.angles is None else angles[0]
-    return omega(replace(campaign, forces=forces[0], angles=robot), case.approach)[0], truth
+    return omega(campaign.with_arrays(forces=forces[0], angles=robot), case.approach)[0], truth
 
 
 @pytest.mark.parametrize("approach", APPROACHES)
@@ -102,7 +102,7 @@ def test_effects_leave_what_those_of_the_catalogue_leave(name, approach):
     shape = own.shape(effect, settings)
     campaign, _ = generate(Case("null", design, "robot", True), seeded(7))
     forces, angles = (part[0] for part in observe(own.session, Sensor(), ()))
-    hold = replace(campaign, forces=forces, angles=angles).hold
+    hold = campaign.with_arrays(forces=forces, angles=angles).hold
     other = type(get_effect(name))(**settings)
     found = signatures((other,), forces, angles, GRAVITY, HoldColumns(hold, 2))
     step = 1e-4 / max(np.abs(found.force).max(), np.abs(found.angles).max())

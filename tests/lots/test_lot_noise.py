@@ -125,5 +125,5 @@ def test_the_mean_of_a_lot_shows_what_all_sensors_have():
     assert mean.p_value < 1e-3
     assert max(mean.odds, key=mean.odds.get) == "unknown(temperature → bias)"
     # There is none of sensors in different positions.
-    turned = [replace(one, campaign=replace(one.campaign, time=None)) for one in small[:1]]
+    turned = [replace(one, campaign=one.campaign.with_arrays(time=None)) for one in small[:1]]
     assert weighed([*turned, *small[1:3]]) == NO_MEAN

@@ -1,7 +1,6 @@
 """Lots of simulated sensors by the command, and the mean and scatter of a type."""
 
 import json
-from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -75,7 +74,7 @@ def test_the_command_says_what_a_lot_lacks(tmp_path):
         write_campaign(one, tmp_path / f"sensor-{i}")
     folders = sorted(tmp_path.glob("sensor-*"))
     few = acs.simulate_campaign(name="few", scheme="faces-6", approach="gravity")
-    copy = replace(read_campaign(folders[0]), name="copy")
+    copy = read_campaign(folders[0]).with_header(name="copy")
     for made in (few, copy):
         write_campaign(made, tmp_path / made.name)
     given = [*folders, tmp_path / "few", tmp_path / "copy"]

@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 import yaml
 from calling import refusal, succeed
+from campaign_helpers import made
 
 import accelstudy as acs
 from accelstudy.approaches import get_approach
@@ -16,7 +17,6 @@ from accelstudy.basics.errors import InputError
 from accelstudy.campaign.calibration.fit import fit_campaign
 from accelstudy.campaign.format import write_campaign
 from accelstudy.campaign.sensor_type import SensorType, read_type
-from accelstudy.campaign.session import Campaign
 from accelstudy.lots.noise import NoisePrior
 from accelstudy.lots.output import Lot
 from accelstudy.lots.type_file import write_type
@@ -34,10 +34,7 @@ USUAL = 5e-4
 def measured(scheme, parameters, rng, name="next"):
     directions = get_scheme(scheme).directions
     drawn = session(MODEL, parameters, directions, GRAVITY).draw(Noise(0.002), 1, rng)
-    return Campaign(
-        name=name, positions=np.arange(1, len(directions) + 1), forces=drawn.forces[0],
-        gravity=GRAVITY, sigma_force=0.002,
-    )  # fmt: skip
+    return made(drawn.forces[0], GRAVITY, 0.002, name=name)
 
 
 def fitted(campaign):

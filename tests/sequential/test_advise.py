@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 import yaml
 from calling import refusal, succeed
+from campaign_helpers import made
 from page_helpers import assert_told_alike
 from places import ROOT
 
@@ -18,7 +19,6 @@ from accelstudy.basics.units import GON, MGON
 from accelstudy.campaign.calibration.assessment import Assessment
 from accelstudy.campaign.calibration.fit import fit_campaign
 from accelstudy.campaign.format import read_campaign
-from accelstudy.campaign.session import Campaign
 from accelstudy.leveling.angles import specific_force
 from accelstudy.schemes import get_scheme
 from accelstudy.sensors.frames import parse_frame
@@ -26,7 +26,6 @@ from accelstudy.sensors.models import get_model
 from accelstudy.sequential.advisor import advise as advice_for
 from accelstudy.sequential.choice import candidate_positions
 from accelstudy.sequential.promise import Promise
-from accelstudy.sequential.running import read_running
 from accelstudy.sequential.wording import attitude
 from accelstudy.simulation.sessions import Noise, session
 
@@ -89,7 +88,7 @@ def test_a_session_without_a_table_is_one_without_positions(begun):
 
 @pytest.mark.parametrize("name", ["gravity", "robot"])
 def test_the_accuracy_is_that_of_the_calibration(begun, name):
-    measured = read_running(begun(16, name))
+    measured = read_campaign(begun(16, name), running=True)
     promise = Promise(10 * MGON, 50 * GON)
     advice = advice_for(
         measured, get_model(MODEL), get_approach(name), promise, candidate_positions("cube")
@@ -101,7 +100,7 @@ def test_the_accuracy_is_that_of_the_calibration(begun, name):
 
 
 def test_the_next_position_is_worth_more_than_others(begun):
-    measured = read_running(begun(14))
+    measured = read_campaign(begun(14), running=True)
     promise, model = Promise(1 * MGON, 30 * GON), get_model(MODEL)
     directions = candidate_positions("cube")
     advice = advice_for(measured, model, get_approach("gravity"), promise, directions)
@@ -189,7 +188,7 @@ def test_a_bumped_position_is_named_and_to_be_repeated(begun):
 @pytest.mark.parametrize(("n", "bumped"), [(10, []), (14, [3]), (17, [16]), (30, []), (30, [5, 9])])
 def test_it_judges_as_the_calibration_does(begun, n, bumped):
     """It said that one can stop where the calibration was rejected, and set positions aside."""
-    measured, promise = read_running(begun(n, bumped=bumped)), Promise(1.0, 50 * GON)
+    measured, promise = read_campaign(begun(n, bumped=bumped), running=True), Promise(1.0, 50 * GON)
     advice = advice_for(
         measured, get_model(MODEL), get_approach("gravity"), promise, candidate_positions("cube")
     )
@@ -224,7 +223,7 @@ def test_it_never_says_enough_where_the_calibration_is_rejected():
         drawn = whole.draw(Noise(0.002), 1, np.random.default_rng(seed))
         for n in (14, 26):
             forces = drawn.forces[0, :n]
-            campaign = Campaign("s", np.arange(1, n + 1), forces, 9.80665, sigma_force=sigma)
+            campaign = made(forces, sigma=sigma)
             advice = advice_for(campaign, model, by, promise, directions)
             state = Assessment(fit_campaign(campaign, model, by)).state
             assert advice.calibration_state == state

@@ -208,7 +208,7 @@ def test_a_log_gives_what_the_commands_make_of_it(guide, tmp_path):
     assert (kept.name, kept.n_positions) == (holds.name, 24)
     np.testing.assert_allclose(kept.forces, holds.forces, rtol=1e-13)
     for range_ in (78.5, "78.5 m/s^2"):
-        assert acs.find_holds(log, range=range_, **HOW).full_range == 78.5
+        assert acs.find_holds(log, range=range_, **HOW).header.range_mps2 == 78.5
 
     file = guide["folder"] / "calibrated/calibration.json"
     succeed("apply", file, log, *WORDS, "--sigma", 0.01, "--out", tmp_path / "leveled.parquet")

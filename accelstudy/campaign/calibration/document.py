@@ -23,6 +23,7 @@ def calibration_document(assessment: Assessment) -> dict[str, Any]:
     """
     fit = assessment.fit
     campaign, adjustment = fit.campaign, fit.adjustment
+    header = campaign.header
     covariance, sigma = fit.covariance, fit.sigma
     affine = fit.model.affine(fit.parameters)
     ranged = {
@@ -33,22 +34,20 @@ def calibration_document(assessment: Assessment) -> dict[str, Any]:
     }
     content = {
         "campaign": campaign.name,
-        "sensor": campaign.sensor,
-        "date": campaign.date,
+        "sensor": header.sensor,
+        "date": header.date,
         "model": fit.model.name,
         "effects": [effect.spec for effect in fit.model.effects],
         "approach": fit.approach.name,
         "reference": None
-        if fit.by_reference is None or campaign.reference is None
-        else campaign.reference.model_dump(include={"calibration", "frame", "sigma_mps2"}),
+        if fit.by_reference is None or header.reference is None
+        else header.reference.model_dump(include={"calibration", "frame", "sigma_mps2"}),
         "type": None
         if campaign.sensor_type is None
         else {"file": campaign.sensor_type.file, "sensors": campaign.sensor_type.sensors},
         "axes": FRD.name,
-        "unit": campaign.unit,
-        "nominal": None
-        if (nominal := campaign.nominal) is None
-        else {"scale": nominal.scale, "offset": nominal.offset},
+        "unit": header.unit,
+        "nominal": header.nominal and header.nominal.model_dump(),
         "gravity_mps2": fit.gravity,
         "n_positions": campaign.n_positions,
         "sigma_source": "a priori" if fit.trusts_sigma else "a posteriori",
@@ -86,14 +85,14 @@ def calibration_document(assessment: Assessment) -> dict[str, Any]:
         "affine": affine and dict(zip(("matrix", "bias_mps2"), affine, strict=True)),
         "mended": None,
         "excluded": campaign.exclusions,
-        "range_mps2": campaign.full_range,
+        "range_mps2": header.range_mps2,
         # Forces that the calibration cannot correct, as of exchanged axes, have no range.
         "ranges": {
             k: [v.min(), v.max()]
             for k, v in ranged.items()
             if v is not None and np.isfinite(v).all()
         },
-        "log": campaign.log and campaign.log.model_dump(exclude_none=True, by_alias=True),
+        "log": header.log and header.log.model_dump(exclude_none=True, by_alias=True),
         "warnings": campaign.warnings,
         "quality": _quality(assessment),
     }

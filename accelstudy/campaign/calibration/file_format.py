@@ -10,7 +10,8 @@ from pydantic import AfterValidator, Field, model_validator
 
 from accelstudy.basics import bounds
 from accelstudy.basics.bounds import Range
-from accelstudy.campaign.header import ANY, Exclusion, LogLayout, Nominal, PerAxis
+from accelstudy.campaign.columns import ANY
+from accelstudy.campaign.header import Exclusion, LogLayout, Nominal, PerAxis
 from accelstudy.files.documents import Document, Part
 from accelstudy.files.validation import Gravity, ParameterSigma, ParameterValue, bounds_of
 from accelstudy.sensors.models import compose

@@ -22,8 +22,8 @@ from accelstudy.basics.errors import InputError
 from accelstudy.basics.shares import sigmas_95
 from accelstudy.basics.units import MGON
 from accelstudy.basics.wording import words
+from accelstudy.campaign.columns import COLUMNS
 from accelstudy.campaign.gross_errors.recognition import recognise
-from accelstudy.campaign.header import COLUMNS
 from accelstudy.campaign.importing.noise import fit_sphere
 from accelstudy.campaign.session import Campaign
 from accelstudy.design.estimability import Estimability, estimability
@@ -200,7 +200,7 @@ class CampaignFit:
     @property
     def gravity(self) -> float:
         """Gravity, m/s²: the adjusted value if it was observed."""
-        if self.campaign.sigma_gravity > 0:
+        if self.campaign.header.gravity.sigma_mps2 > 0:
             return float(self.adjustment.parameters[0, -1])
         return self.campaign.gravity
 
@@ -230,14 +230,15 @@ def campaign_noise(campaign: Campaign) -> Noise:
     """Stochastic model of a campaign; an unknown sigma is `UNIT_SIGMA`."""
     return Noise(
         sigma_force=UNIT_SIGMA if campaign.sigma_force is None else campaign.sigma_force,
-        sigma_angle=campaign.sigma_angle or 0.0,
-        sigma_gravity=campaign.sigma_gravity,
+        sigma_angle=campaign.header.sigma_angle or 0.0,
+        sigma_gravity=campaign.header.gravity.sigma_mps2,
     )
 
 
 def least_sigma(campaign: Campaign, approach: Approach) -> float:
     """Smallest noise of a force, m/s², that can be weighed against that of the angles."""
-    return LEAST_RATIO * campaign.gravity * (campaign.sigma_angle or 0.0) * approach.uses_angles
+    sigma_angle = campaign.header.sigma_angle or 0.0
+    return LEAST_RATIO * campaign.gravity * sigma_angle * approach.uses_angles
 
 
 def campaign_observations(campaign: Campaign) -> Observations:
@@ -254,18 +255,17 @@ def campaign_observations(campaign: Campaign) -> Observations:
         common=sigma_angle[1],
         angle_errors=errors,
         gravity=campaign.gravity,
-        sigma_gravity=campaign.sigma_gravity,
+        sigma_gravity=noise.sigma_gravity,
         hold=campaign.hold,
         known={} if campaign.sensor_type is None else campaign.sensor_type.known,
-        sigma_dof=campaign.sigma_dof or np.inf,
+        sigma_dof=campaign.header.sigma_dof,
     )
 
 
 def angle_errors(campaign: Campaign) -> AngleErrors | None:
     """Errors of a reference in any attitude, as of `Observations`; None without a reference."""
-    if campaign.reference is None:
-        return None
-    return partial(campaign.reference.errors, gravity=campaign.gravity)
+    reference = campaign.header.reference
+    return None if reference is None else partial(reference.errors, gravity=campaign.gravity)
 
 
 def check_campaign(campaign: Campaign, model: SensorModel, approach: Approach) -> None:
@@ -278,7 +278,7 @@ def check_campaign(campaign: Campaign, model: SensorModel, approach: Approach) -
     for effect, column in model.needs:
         if getattr(campaign.hold, column) is None:
             attribute = "angles" if column in ("roll", "pitch") else column
-            names = " and ".join(COLUMNS[attribute].names)
+            names = " and ".join(COLUMNS[attribute].keys)
             raise InputError(
                 f"{campaign.name}: the effect {effect!r} of the model needs the {column} "
                 f"of each position; the campaign has no {names}"

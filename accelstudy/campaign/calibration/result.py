@@ -242,7 +242,7 @@ class Calibration(Result):
         if self.content["sigmas_95"] is not None:
             say(f"±: {wording.interval_words(fit)}")
         say(wording.approach_words(fit))
-        say(axes_note(None if fit.campaign.log is None else fit.campaign.log.frame))
+        say(axes_note(None if (log := fit.campaign.header.log) is None else log.frame))
         show(f"{self.state.upper()}: {self.verdict}")
         steps = wording.next_steps(fit, self.state, self.source, place / HERE)
         say(": ".join(steps[0]))

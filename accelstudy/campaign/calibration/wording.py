@@ -37,6 +37,7 @@ def parameter_lines(content: Mapping[str, Any]) -> list[str]:
 def verdict_lines(assessment: Assessment) -> list[str]:
     """Say how good the calibration is, for what, and what limits it; the verdict comes first."""
     fit, state, shares = assessment.fit, assessment.state, assessment.tilt.shares
+    steps = fit.campaign.header.resolution_mps2
     says_tilt = state != IMPLAUSIBLE and np.isfinite(assessment.tilt.total).all()
     suspects = {
         int(fit.campaign.positions[suspect.position]): suspect.p_value
@@ -51,7 +52,7 @@ def verdict_lines(assessment: Assessment) -> list[str]:
         max_tilt=MAX_TILT_GON * GON,
         usual_cause=USUAL_CAUSE,
         diagnose=state in (REJECTED, IMPLAUSIBLE) or (state != ACCEPTED and bool(suspects)),
-        resolution="" if fit.campaign.resolution is None else steps_text(fit.campaign.resolution),
+        resolution="" if steps is None else steps_text(np.array(steps)),
         right_angles=state != REJECTED
         and not ANGLES & {effect.name for effect in fit.model.effects},
         blind="" if fit.approach.uses_angles else BLIND,
@@ -61,7 +62,7 @@ def verdict_lines(assessment: Assessment) -> list[str]:
 def approach_words(fit: CampaignFit) -> str:
     """Say what the positions were held against."""
     campaign = fit.campaign
-    has = campaign.angles is not None, campaign.reference is not None
+    has = campaign.angles is not None, campaign.header.reference is not None
     return render_lines(TEMPLATE, "approach", fit.approach.name, fit.approach.uses_angles, *has)[0]
 
 

@@ -11,7 +11,7 @@ from collections.abc import Callable, Generator, Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 from itertools import chain, permutations, product
-from typing import Any
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -197,8 +197,8 @@ def check_plausible(campaign: Campaign, where: str, angle_unit: str = "gon") -> 
     InputError
         If a wrong unit or sign is recognised; it says what would be right.
     """
-    conversion = campaign.nominal or conversion_of(campaign.unit)
-    doubts = check_size(where, campaign.forces, campaign.gravity, campaign.unit, conversion)
+    unit, conversion = campaign.header.unit, campaign.header.conversion("forces")
+    doubts = check_size(where, campaign.forces, campaign.gravity, unit, conversion)
     if campaign.angles is None:
         return doubts
     for error in _everywhere(campaign, True, angle_unit):
@@ -295,6 +295,37 @@ def _is_clear(correction: Correction, before: RealSensor, after: RealSensor) -> 
 # --- What would mend a campaign, the simplest first -----------------------------------------------
 
 
+class Exchange(NamedTuple):
+    """Undoing of an exchange of axes, or of columns of counts.
+
+    Attributes
+    ----------
+    reason : str, what is exchanged; empty if nothing is
+    forces : (n, 3) array, m/s², mended
+    matrix : (3, 3) array, turns forces as they were read into mended ones, but for an offset
+    offset : (3,) array, counts at 0 m/s² of the mended axes; None if it stays
+    """
+
+    reason: str
+    forces: Array
+    matrix: Array
+    offset: Array | None = None
+
+    def correct(self, campaign: Campaign) -> Correction:
+        """Undo the exchange in a campaign."""
+        sd = None if campaign.sd is None else np.abs(_permuted(campaign.sd, self.matrix))
+        mended = campaign.with_arrays(forces=self.forces, sd=sd)
+        if self.offset is not None:
+            header = campaign.header
+            scale, log = header.conversion("forces").scale, header.log
+            if log is not None:
+                in_its_axes = self.offset[np.argsort(log.axes.order)].tolist()
+                log = log.model_copy(update={"offset": in_its_axes})
+            nominal = {"scale": scale.tolist(), "offset": self.offset.tolist()}
+            mended = mended.with_header(nominal=nominal, log=log)
+        return Correction("axis_error", self.reason, mended, self.matrix)
+
+
 def axes(sensor: RealSensor) -> Iterator[Correction]:
     """Undo each of the 47 exchanges of axes that are likely."""
     campaign = sensor.campaign
@@ -304,19 +335,20 @@ def axes(sensor: RealSensor) -> Iterator[Correction]:
     # An ideal sensor with any bias is near enough to compare all quickly.
     tried, misses = [], []
     for shown in SIGNED_PERMUTATIONS:
-        for correction in _undone(campaign, matrix_of(shown).T):
-            error = correction.campaign.forces - ideal
+        for exchange in _exchanges(campaign, shown):
+            error = exchange.forces - ideal
             bias = np.median(error, axis=0)
             distance = np.linalg.norm(error - bias, axis=1)
             misses.append(float(np.mean(np.minimum(distance, campaign.gravity))))
             moved = sum(abs(axis) != i for i, axis in enumerate(shown, 1))
             changes = (moved, sum(axis < 0 for axis in shown), float(np.linalg.norm(bias)))
-            tried.append((changes, correction))
+            tried.append((changes, exchange))
     near = [
         one for one, miss in zip(tried, misses, strict=True) if miss < MAX_AXIS_RATIO * min(misses)
     ]
-    yield from (one for _, one in sorted(near, key=lambda one: one[0]) if one.reason)
-    exchanged = replace(campaign, angles=campaign.angles[:, ::-1].copy())
+    simplest = sorted(near, key=lambda one: one[0])
+    yield from (exchange.correct(campaign) for _, exchange in simplest if exchange.reason)
+    exchanged = campaign.with_arrays(angles=campaign.angles[:, ::-1])
     yield Correction("axis_error", "roll and pitch of the robot are exchanged", exchanged)
 
 
@@ -325,38 +357,37 @@ def columns_of_counts(sensor: RealSensor) -> Iterator[Correction]:
 
     As they were read, no sensor has such biases and scales, though all positions may agree.
     """
-    if sensor.campaign.nominal is None or not sensor.tells or sensor.strangeness <= 1:
+    campaign = sensor.campaign
+    if campaign.header.nominal is None or not sensor.tells or sensor.strangeness <= 1:
         return
-    exchanged = [shown for shown in SIGNED_PERMUTATIONS if min(shown) > 0]
-    tried = {
-        replace(sensor, campaign=correction.campaign): correction
-        for shown in exchanged
-        for correction in list(_undone(sensor.campaign, matrix_of(shown).T))[1:]
-    }
-    best = min(tried, key=lambda one: one.strangeness, default=sensor)
-    if best.strangeness <= 1:
-        yield tried[best]
+    corrections = [
+        exchange.correct(campaign)
+        for shown in SIGNED_PERMUTATIONS
+        if min(shown) > 0
+        for exchange in _exchanges(campaign, shown)
+        if exchange.offset is not None
+    ]
+    strangeness = [replace(sensor, campaign=one.campaign).strangeness for one in corrections]
+    if min(strangeness, default=np.inf) <= 1:
+        yield corrections[int(np.argmin(strangeness))]
 
 
-def _undone(campaign: Campaign, matrix: Array) -> Iterator[Correction]:
+def _exchanges(campaign: Campaign, shown: Sequence[int]) -> Iterator[Exchange]:
     """Undo an exchange of axes, and one of columns of counts, before nominal scales and offsets."""
+    matrix = matrix_of(shown).T
     reason = _axes_in_words(matrix) if np.any(matrix != np.eye(3)) else ""
-    yield Correction("axis_error", reason, permute_axes(campaign, matrix), matrix)
-    if (nominal := campaign.nominal) is None or not reason:
+    yield Exchange(reason, _permuted(campaign.forces, matrix), matrix)
+    if campaign.header.nominal is None or not reason:
         return
     # Counts P r, read with S and o, were r: S (r − o) = S P S⁻¹ · S (P⁻¹ r − P⁻¹ o).
+    nominal = campaign.header.conversion("forces")
     scaled = matrix * nominal.scale[:, None] / nominal.scale
     offset = np.abs(matrix).T @ nominal.offset
     if np.allclose(scaled, matrix) and np.array_equal(offset, nominal.offset):
         return
-    moved = campaign.forces + (nominal.offset - offset) * nominal.scale
-    log = campaign.log
-    if log is not None:
-        in_its_axes = offset[np.argsort(log.axes.order)].tolist()
-        log = log.model_copy(update={"offset": in_its_axes})
-    read = replace(campaign, forces=moved, nominal=Conversion(nominal.scale, offset), log=log)
+    forces = _permuted(campaign.forces + (nominal.offset - offset) * nominal.scale, scaled)
     reason += ", in the counts, before `scale` and `offset`"
-    yield Correction("axis_error", reason, permute_axes(read, scaled), scaled)
+    yield Exchange(reason, forces, scaled, offset)
 
 
 def _axes_in_words(matrix: Array) -> str:
@@ -377,7 +408,7 @@ def units(sensor: RealSensor, angle_unit: str = "gon") -> Iterator[Correction]:
         return
     campaign = sensor.campaign
     norm = usual_norm(campaign.forces) / campaign.gravity
-    own = campaign.unit if campaign.unit in SENSOR_UNITS else "m/s^2"
+    own = campaign.header.unit if campaign.header.unit in SENSOR_UNITS else "m/s^2"
     for stated in (own, "g" if own == "m/s^2" else "m/s^2"):
         for unit, factor in other_units(SENSOR_UNITS, "m/s^2", stated).items():
             if RIGHT_UNIT < factor * norm < 1 / RIGHT_UNIT:
@@ -436,12 +467,6 @@ def outliers(sensor: RealSensor) -> Iterator[Correction]:
 # --- What undoes them ---------------------------------------------------------------------------
 
 
-def _with_readings(campaign: Campaign, change: Callable[[Array], Array]) -> Campaign:
-    """Apply a change to all columns of what the sensor reads, (n, 3) each; sds have no sign."""
-    sd = None if campaign.sd is None else np.abs(change(campaign.sd))
-    return replace(campaign, forces=change(campaign.forces), sd=sd)
-
-
 def matrix_of(shown: Sequence[float]) -> Array:
     """P of what the channels show: f → P f."""
     matrix = np.zeros((3, 3))
@@ -449,22 +474,28 @@ def matrix_of(shown: Sequence[float]) -> Array:
     return matrix
 
 
-def permute_axes(campaign: Campaign, matrix: Array) -> Campaign:
-    """Return the campaign with f → P f; columns are reordered, not summed, so no digit changes."""
+def _permuted(values: Array, matrix: Array) -> Array:
+    """Apply f → P f to (n, 3); columns are reordered, not summed, so no digit changes."""
     axes = np.argmax(np.abs(matrix), axis=1)
-    return _with_readings(campaign, lambda values: matrix[range(3), axes] * values[:, axes])
+    return np.asarray(matrix[range(3), axes] * values[:, axes])
+
+
+def permute_axes(campaign: Campaign, matrix: Array) -> Campaign:
+    """Return the campaign with f → P f; sds have no sign."""
+    return Exchange("", _permuted(campaign.forces, matrix), matrix).correct(campaign).campaign
 
 
 def reorder_rows(campaign: Campaign, order: NDArray[np.int_]) -> Campaign:
     """Return the campaign with the readings in another order."""
-    n_samples = None if campaign.n_samples is None else campaign.n_samples[order]
-    return replace(_with_readings(campaign, lambda values: values[order]), n_samples=n_samples)
+    read = {"forces": campaign.forces, "sd": campaign.sd, "n_samples": campaign.n_samples}
+    arrays = {name: array[order] for name, array in read.items() if array is not None}
+    return campaign.with_arrays(**arrays)
 
 
 def angles_times(campaign: Campaign, factor: float) -> Campaign:
     """Return the campaign with the robot's angles multiplied by a factor."""
-    columns: dict[str, Any] = {"angles": campaign.angles, "yaw": campaign.yaw}
-    return replace(campaign, **{key: factor * v for key, v in columns.items() if v is not None})
+    arrays = {"angles": campaign.angles, "yaw": campaign.yaw}
+    return campaign.with_arrays(**{k: factor * v for k, v in arrays.items() if v is not None})
 
 
 def other_units(units: Iterable[str], quantity: str, stated: str) -> dict[str, float]:

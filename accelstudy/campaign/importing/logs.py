@@ -10,8 +10,9 @@ from typing import TYPE_CHECKING, Any, cast
 import numpy as np
 from numpy.typing import NDArray
 
+from accelstudy.basics.bounds import SIGMA_FORCE
 from accelstudy.basics.errors import InputError
-from accelstudy.basics.units import MGON, UNITS, display_unit, to_display
+from accelstudy.basics.units import UNITS, display_unit, to_display
 from accelstudy.campaign.gross_errors.recognition import check_plausible
 from accelstudy.campaign.header import LogLayout, Place
 from accelstudy.campaign.importing.columns import SDS, thermometers
@@ -22,7 +23,6 @@ from accelstudy.campaign.importing.recording import Recording
 from accelstudy.campaign.importing.settings import ImportSettings
 from accelstudy.campaign.importing.windows import usual_window
 from accelstudy.campaign.session import Campaign
-from accelstudy.sensors.conversion import Conversion
 
 if TYPE_CHECKING:
     from accelstudy.campaign.reference_log import ReferenceLog
@@ -149,6 +149,7 @@ def _campaign_of_means(log: Log, settings: ImportSettings) -> Campaign:
     columns: dict[str, Any] = {
         key: rows[key].to_numpy() for key in ("temperature", "vibration") if key in rows
     }
+    sigma = None
     if "time" in log.places:
         columns["time"] = rows["time"].to_numpy() + (log.start if abs(log.start) < _YEARS else 0.0)
     if "n_samples" in rows:
@@ -161,25 +162,22 @@ def _campaign_of_means(log: Log, settings: ImportSettings) -> Campaign:
         if np.any(sd < 0):
             raise InputError(f"{log.path}: columns {', '.join(SDS)}: must not be negative")
         if "n_samples" in columns and np.any(sd > 0):
-            columns["sigma_force"] = float(np.sqrt(np.mean(sd**2 / n_samples[:, None])))
+            sigma = float(np.sqrt(np.mean(sd**2 / n_samples[:, None])))
             warnings.append("sigma of a mean assumes white noise; coloured noise makes it larger")
     if robot is not None:
         turned = rows[angles].to_numpy() * UNITS["rad"][robot.unit] * frame.signs[: len(angles)]
-        columns |= {"angles": turned[:, :2], "sigma_angle": robot.angle_sigma_mgon * MGON}
+        columns["angles"] = turned[:, :2]
         if "yaw" in angles:
             columns["yaw"] = turned[:, 2]
     # Logs of the sensor have the unit and the axes of the table, but not its columns.
     shared = log.layout.model_dump(include={"unit", "scale", "offset", "frame"}, exclude_none=True)
-    sigma = sigma_text(columns["sigma_force"]) if "sigma_force" in columns else "unknown"
-    return _campaign(
-        log,
-        settings,
-        LogLayout.model_validate(shared),
-        log.forces,
-        notes=(f"{len(rows)} positions; sigma of a mean: {sigma}",),
-        warnings=tuple(warnings),
-        **columns,
-    )
+    header = _header(log, settings, LogLayout.model_validate(shared))
+    header["sensor_noise"] = None if sigma is None else {"sigma_mps2": sigma}
+    header["robot"] = robot and {"angle_sigma_mgon": robot.angle_sigma_mgon}
+    campaign = Campaign.of(header, forces=log.forces, **columns)
+    told = "unknown" if sigma is None else sigma_text(sigma)
+    notes = (f"{len(rows)} positions; sigma of a mean: {told}",)
+    return _checked(replace(campaign, notes=notes, warnings=tuple(warnings)), log, settings)
 
 
 # --- The campaign of holds ------------------------------------------------------------------------
@@ -194,10 +192,11 @@ def _campaign_of_holds(
     """
     log, note = holds.log, ""
     columns: dict[str, Any] = {}
+    sensor = None
     gravity = settings.gravity.value_mps2
     settings, offset = _with_offset(settings, holds)
     if reference is not None:
-        holds, columns, note = reference.angles_for(holds, offset, gravity)
+        holds, columns["angles"], sensor, note = reference.angles_for(holds, offset, gravity)
     table, noise = holds.table, holds.noise
     rounded = noise.rounding > MIN_ROUNDING_RATIO * noise.accuracy.allan
     timed = holds.size is None or "time" in log.first.places
@@ -205,23 +204,29 @@ def _campaign_of_holds(
         columns["time"] = ((table["t0"] + table["t1"]) / 2).to_numpy()
     known = [name for name in log.conditions if table[name].notna().all()]
     columns |= {name: table[name].to_numpy() for name in known}
-    campaign = _campaign(
-        log.first,
-        settings,
-        _layout_of(settings, log.first),
-        holds.means - offset,
-        several=len(log.parts) > 1,
+    layout = _layout_of(settings, log.first)
+    header = _header(log.first, settings, layout, several=len(log.parts) > 1)
+    stated = {"sigma_mps2": noise.sigma, "degrees_of_freedom": max(1.0, float(round(noise.dof)))}
+    header |= {
+        # Readings that never change within a hold do not show their noise.
+        "sensor_noise": stated if noise.sigma >= SIGMA_FORCE.least else None,
+        "resolution_mps2": holds.windows.steps.tolist() if rounded else None,
+        "reference": sensor,
+    }
+    campaign = Campaign.of(
+        header,
         positions=table.index.to_numpy(),
-        sigma_force=noise.sigma,
-        sigma_dof=float(round(noise.dof)),
-        resolution=holds.windows.steps if rounded else None,
+        forces=holds.means - offset,
         n_samples=table["n"].to_numpy(),
         sd=table[[*SDS]].to_numpy(),
-        notes=tuple(_notes(holds, settings, bool(offset.any()), note, rounded)),
-        warnings=tuple(_warnings(holds, gravity)),
         **columns,
     )
-    return campaign.without(holds.left_out), holds
+    campaign = replace(
+        campaign,
+        notes=tuple(_notes(holds, settings, bool(offset.any()), note, rounded)),
+        warnings=tuple(_warnings(holds, gravity)),
+    )
+    return _checked(campaign, log.first, settings).without(holds.left_out), holds
 
 
 def _with_offset(settings: ImportSettings, holds: Holds) -> tuple[ImportSettings, Array]:
@@ -241,18 +246,12 @@ def _with_offset(settings: ImportSettings, holds: Holds) -> tuple[ImportSettings
     return settings, settings.axes.to_frd(offset * scale)
 
 
-def _campaign(
-    log: Log,
-    settings: ImportSettings,
-    layout: LogLayout,
-    forces: Array,
-    several: bool = False,
-    **columns: Any,
-) -> Campaign:
-    """Make a campaign of forces (n, 3) in m/s², in forward, right, down, as the settings say.
+def _header(
+    log: Log, settings: ImportSettings, layout: LogLayout, several: bool = False
+) -> dict[str, Any]:
+    """Header of a campaign, as the settings say.
 
     Without a name it has that of the file without endings, or of the folder of several files.
-    Forces nowhere near gravity, or angles of a robot in another unit, are an error.
     """
     name = Path(log.path.stem).stem if log.path.suffix == ".gz" else log.path.stem
     if several:
@@ -261,22 +260,21 @@ def _campaign(
     if settings.unit == "counts":
         frame, conversion = settings.axes, settings.conversion
         scale = frame.to_frd_order(conversion.scale) * frame.signs
-        nominal = Conversion(scale, frame.to_frd_order(conversion.offset))
-    campaign = Campaign(
-        **{
-            "name": settings.name or name,
-            "positions": np.arange(1, len(forces) + 1),
-            "forces": forces,
-            "gravity": settings.gravity.value_mps2,
-            "sigma_gravity": settings.gravity.sigma_mps2,
-            "unit": settings.unit,
-            "sensor": settings.sensor,
-            "nominal": nominal,
-            "full_range": settings.range_mps2,
-            "log": layout,
-            **columns,
-        }
-    )
+        offset = frame.to_frd_order(conversion.offset)
+        nominal = {"scale": scale.tolist(), "offset": offset.tolist()}
+    return {
+        "name": settings.name or name,
+        "sensor": settings.sensor,
+        "unit": settings.unit,
+        "nominal": nominal,
+        "gravity": settings.gravity.model_dump(),
+        "range_mps2": settings.range_mps2,
+        "log": layout,
+    }
+
+
+def _checked(campaign: Campaign, log: Log, settings: ImportSettings) -> Campaign:
+    """Refuse forces nowhere near gravity and angles in another unit; add what is doubtful."""
     angle_unit = "gon" if settings.robot is None else settings.robot.unit
     doubts = check_plausible(campaign, f"{log.path}", angle_unit)
     return replace(campaign, warnings=(*campaign.warnings, *doubts))

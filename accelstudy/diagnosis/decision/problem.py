@@ -112,7 +112,7 @@ def fit_base(campaign: Campaign, model: SensorModel, approach: Approach) -> Base
         if not stated:
             least = max(1e-9, least_sigma(campaign, approach))
             sigma = max(fit.sigma_position, least)
-            measured = replace(measured, sigma_force=sigma)
+            measured = measured.with_sigma(sigma)
     solution = solve(fit.model, fit.approach, fit.observed, fit.adjustment)
     sd, n, within = campaign.sd, campaign.n_samples, None
     if sd is not None and n is not None and np.all(sd > 0):

@@ -136,8 +136,9 @@ class Diagnosis(Result):
         show(verdict)
         for line in lines:
             say(line)
-        if campaign.log is not None and campaign.log.frame != FRD.name:
-            say(axes_note(campaign.log.frame))
+        log = campaign.header.log
+        if log is not None and log.frame != FRD.name:
+            say(axes_note(log.frame))
         say(f"report: {place / 'report.html'}")
 
 

@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 
 from accelstudy.basics.errors import InputError
+from accelstudy.basics.units import MGON
 from accelstudy.campaign.session import Campaign
 from studies.hidden.physics.conditions import Conditions, Shape
 from studies.hidden.physics.geometry import GRAVITY, Array
@@ -165,16 +166,21 @@ def generate(
     noise = Noise.drawn(case.noise, session, rng)
     forces = noise.read(output, session, rng)
     reading = encoders + session.sigma_angle * rng.standard_normal(encoders.shape)
-    recorded = ("time", "temperature", "vibration", "full_range")
-    more: dict[str, Any] = {name: getattr(session, name) for name in recorded}
+    recorded = ("time", "temperature", "vibration")
+    columns: dict[str, Any] = {name: getattr(session, name) for name in recorded}
     if conditions.robot:
-        more |= {"angles": reading, "sigma_angle": session.sigma_angle, "yaw": session.yaw}
+        columns |= {"angles": reading, "yaw": session.yaw}
     if n := session.n_samples:
-        more |= {"sd": noise.sds(session, rng), "n_samples": np.full(session.n, n)}
-    if case.sigma_known:
-        more["sigma_force"] = session.sigma
-    positions = np.arange(1, session.n + 1)
-    campaign = Campaign(f"hidden {case.design}", positions, forces, gravity=GRAVITY, **more)
+        columns |= {"sd": noise.sds(session, rng), "n_samples": np.full(session.n, n)}
+    robot = {"angle_sigma_mgon": session.sigma_angle / MGON}
+    header = {
+        "name": f"hidden {case.design}",
+        "gravity": {"value_mps2": GRAVITY},
+        "sensor_noise": {"sigma_mps2": session.sigma} if case.sigma_known else None,
+        "robot": robot if conditions.robot else None,
+        "range_mps2": session.full_range,
+    }
+    campaign = Campaign.of(header, forces=forces, **columns)
     settings: dict[str, float] = {}
     if case.gross is not None:
         campaign, settings = GROSS[case.gross](campaign, rng, session.sigma, conditions)

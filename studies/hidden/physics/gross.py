@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import replace
 from itertools import permutations, product
 
 import numpy as np
@@ -27,7 +26,7 @@ ANGLE_UNITS = (180 / np.pi * GON, GON)
 def _with_axes(campaign: Campaign, change: Callable[[Array], Array]) -> Campaign:
     """Change all that has a value for each axis."""
     sd = None if campaign.sd is None else change(campaign.sd)
-    return replace(campaign, forces=change(campaign.forces), sd=sd)
+    return campaign.with_arrays(forces=change(campaign.forces), sd=sd)
 
 
 def _axis_error(campaign: Campaign, rng: Random, *_: object) -> Changed:
@@ -37,7 +36,7 @@ def _axis_error(campaign: Campaign, rng: Random, *_: object) -> Changed:
     exchanged = _with_axes(campaign, lambda values: values[:, order])
     shown = [sign * (axis + 1) for axis, sign in zip(order, signs, strict=True)]
     forces = np.array(signs) * exchanged.forces
-    return replace(exchanged, forces=forces), dict(zip("xyz", shown, strict=True))
+    return exchanged.with_arrays(forces=forces), dict(zip("xyz", shown, strict=True))
 
 
 def _unit_error(campaign: Campaign, rng: Random, *_: object) -> Changed:
@@ -45,7 +44,7 @@ def _unit_error(campaign: Campaign, rng: Random, *_: object) -> Changed:
     if campaign.angles is not None and rng.random() < 0.5:
         factor = float(rng.choice(ANGLE_UNITS))
         yaw = None if campaign.yaw is None else campaign.yaw * factor
-        return replace(campaign, angles=campaign.angles * factor, yaw=yaw), {"angle": factor}
+        return campaign.with_arrays(angles=campaign.angles * factor, yaw=yaw), {"angle": factor}
     factor = float(rng.choice(FORCE_UNITS))
     return _with_axes(campaign, lambda values: values * factor), {"force": factor}
 
@@ -82,7 +81,7 @@ def _outlier_position(
         if lam > LEAST:
             error = dict(zip("xyz", change[0, row].tolist(), strict=True))
             settings = {"position": row + 1.0, **error, "lam": lam}
-            return replace(campaign, forces=campaign.forces + change[0]), settings
+            return campaign.with_arrays(forces=campaign.forces + change[0]), settings
 
 
 GROSS: dict[str, Callable[[Campaign, Random, float, Conditions], Changed]] = {

@@ -75,7 +75,7 @@ def generate_lot(
                 factors = np.exp(SCATTER * rng.standard_normal(parameters.shape))
                 given[name] = replace(of_type[name], parameters=parameters * factors)
         campaign, truth = generate(case, its_seed, given, rough)
-        yield replace(campaign, name=f"sensor-{i + 1}"), truth
+        yield campaign.with_header(name=f"sensor-{i + 1}"), truth
 
 
 def lot_oracle(lot: LotCase, made: Sequence[tuple[Campaign, Truth]]) -> Verdict:
