@@ -264,13 +264,11 @@ class InputQuantity:
     Attributes
     ----------
     unit : str, SI
-    usual : str, with its unit; empty if there is none
     least, most : float, SI, both allowed
     bare : bool, whether a number without a unit is one in SI, also as a text
     """
 
     unit: str
-    usual: str = ""
     least: float = 0.0
     most: float = math.inf
     bare: bool = False
@@ -278,11 +276,6 @@ class InputQuantity:
     def read(self, text: str) -> float:
         """Value of a text with its unit, SI; raises `InputError` if it is not one."""
         return parse_quantity(text, self.unit, self.least, self.most, self.bare)
-
-    @property
-    def value(self) -> float:
-        """Usual value, SI."""
-        return self.read(self.usual)
 
 
 def _numbers(value: ArrayLike) -> NDArray[np.float64]:

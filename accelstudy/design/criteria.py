@@ -50,17 +50,14 @@ class Criterion:
     text : str, what it minimises, for people
     forms : (a, u, u) array, W of each mean square
     power : int, of the power mean
+    degree : int, of e^criterion as a function of the variances
     """
 
     name: str
     text: str
     forms: Array
     power: int = 1
-
-    @property
-    def degree(self) -> int:
-        """Degree of e^criterion as a function of the variances."""
-        return 1
+    degree: int = 1
 
     def squares(self, normal: Array) -> Array:
         """Mean squares, (a, ...), of normal matrices (..., u, u)."""
@@ -107,11 +104,6 @@ class Criterion:
 class Determinant(Criterion):
     """D: the volume of the confidence ellipsoid of the parameters."""
 
-    @property
-    def degree(self) -> int:
-        """The determinant has one of each parameter."""
-        return self.forms.shape[-1]
-
     def value(self, normal: Array) -> Array:
         """Log-determinant of the covariance matrix."""
         return np.asarray(-np.linalg.slogdet(_above_ridge(normal))[1])
@@ -136,8 +128,10 @@ def get_criterion(name: str, task: Task) -> Criterion:
         raise UnknownNameError("criterion", name, TEXTS)
     angles = task.tilt_weights
     forms = {"I": angles.mean(axis=0)[None], MINIMAX: angles}
-    kind, power = Determinant if name == "D" else Criterion, POWER if name == MINIMAX else 1
-    return kind(name, TEXTS[name], forms.get(name, np.eye(len(task.names))[None]), power)
+    u = len(task.names)
+    kinds = {"D": (Determinant, 1, u), MINIMAX: (Criterion, POWER, 1)}
+    kind, power, degree = kinds.get(name, (Criterion, 1, 1))
+    return kind(name, TEXTS[name], forms.get(name, np.eye(u)[None]), power, degree)
 
 
 def rms_tilt(task: Task, directions: ArrayLike) -> Array:

@@ -33,17 +33,13 @@ def field_order(task: Task, directions: Array) -> Order:
     angles = np.arccos(np.clip(directions @ directions.T, -1, 1))
     rng = np.random.default_rng(np.random.SeedSequence(len(directions)))
     trips = [_round_trip(angles, rng.permutation(len(directions))) for _ in range(TOURS)]
-    lengths = np.array([_length(angles, trip) for trip in trips])
+    lengths = np.array([angles[trip, np.roll(trip, -1)].sum() for trip in trips])
     near = np.flatnonzero(lengths <= MAX_TOUR_RATIO * lengths.min() + 1e-9)
     turns = range(len(directions))
     orders = [np.array([np.roll(trips[i], turn) for turn in turns]) for i in near]
     # Tour by tour, so that memory does not follow their number.
     shown = np.concatenate([_drift_shown(task, directions[of_tour]) for of_tour in orders])
     return np.concatenate(orders)[first_best(-shown)]
-
-
-def _length(angles: Array, tour: Order) -> float:
-    return float(angles[tour, np.roll(tour, -1)].sum())
 
 
 def _round_trip(angles: Array, tour: Order) -> Order:

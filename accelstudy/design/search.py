@@ -7,7 +7,7 @@ nearly coincide become repeats.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from functools import cached_property
 
 import numpy as np
@@ -47,24 +47,6 @@ DESIGN_TOLERANCE = 1e-6
 
 
 @dataclass(frozen=True, eq=False)
-class Optimum:
-    """Positions that were found.
-
-    Attributes
-    ----------
-    directions : (n, 3) array of unit vectors, gravity in the body frame, to 8 decimals
-    value : float, of the criterion
-    bound : float, lower bound of the criterion; NaN if it is not wanted
-    efficiency : float, against the bound; NaN without a bound
-    """
-
-    directions: Array
-    value: float
-    bound: float = np.nan
-    efficiency: float = np.nan
-
-
-@dataclass(frozen=True, eq=False)
 class Search:
     """The search for positions that are best by a criterion.
 
@@ -84,14 +66,13 @@ class Search:
     seed: int = 1
     _settled: dict[tuple[int, int], Array] = field(default_factory=dict)
 
-    def optimum(self, n: int, starts: int = STARTS, bounded: bool = True) -> Optimum:
-        """Find the best n positions.
+    def optimum(self, n: int, starts: int = STARTS) -> Array:
+        """Find the best n positions, (n, 3): directions of gravity in the body frame.
 
         Parameters
         ----------
         n : int
         starts : int, random sets to begin with; those of an earlier search are not searched again
-        bounded : bool, whether the bound, and with it the efficiency, is wanted
 
         Raises
         ------
@@ -104,18 +85,21 @@ class Search:
         each = [self._from_start(n, start) for start in range(1, starts + 1)]
         best = each[first_best([self.value(one) for one in each], DESIGN_TOLERANCE)]
         directions = round_directions(self._join(best))
-        found = Optimum(directions, self.value(directions))
         if reason := self.task.missing(directions):
             if of_all := self.task.missing(self.candidates):
                 raise InputError(f"the allowed attitudes do not suffice: {of_all}")
             raise InputError(
                 f"no {n} positions of {self.allowed.text} were found that suffice: {reason}"
             )
-        if not bounded:
-            return found
-        bound = continuous_optimum(self.task, self.criterion, self.allowed, n).bound
-        efficiency = self.criterion.efficiency(found.value, bound)
-        return replace(found, bound=bound, efficiency=efficiency)
+        return directions
+
+    def bound(self, n: int) -> float:
+        """Lower bound of the criterion of any n allowed positions."""
+        return continuous_optimum(self.task, self.criterion, self.allowed, n).bound
+
+    def efficiency(self, directions: Array) -> float:
+        """Least share that positions reach of the best that as many positions can."""
+        return self.criterion.efficiency(self.value(directions), self.bound(len(directions)))
 
     def _from_start(self, n: int, start: int) -> Array:
         """Positions that a search from one random set ends in, (n, 3)."""

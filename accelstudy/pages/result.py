@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
+from contextlib import AbstractContextManager
 from os import PathLike
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, ClassVar
@@ -31,8 +32,10 @@ class Result(ABC):
     """
 
     name: str
-    kind: ClassVar[OutputKind]
+    kind: ClassVar[OutputKind | None] = None
     """Of the folder that is written; a result that is a file has none."""
+    new_file: ClassVar[Callable[..., AbstractContextManager[Path]]] = staticmethod(new_file)
+    """Opens that file."""
     exit_status = 0
     """Of the command; where it is not 0, there is nothing to write."""
     document: ClassVar[type[Document]]
@@ -104,8 +107,8 @@ class Result(ABC):
         InputError
             If the folder has such files, or cannot be written; nothing is written then.
         """
-        place, kind = path_of("folder", folder), getattr(self, "kind", None)
-        with (kind.place if kind else new_file)(place, (), force) as part:
+        place = path_of("folder", folder)
+        with (self.kind.place if self.kind else self.new_file)(place, (), force) as part:
             self.write(part, place)
 
     def summary(self) -> str:

@@ -63,11 +63,11 @@ def plan_for(**given: Any) -> Plan:
         given["tilt_range"],
         sheet,
         equipment[given["equipment"]],
+        given["robot_sigma"],
+        given["max_positions"],
         given["confidence"],
         tuple(sorted({*given["holds"]})),
-        given["robot_sigma"],
         math.inf if max_time is None else max_time,
-        given["max_positions"],
     )
     begin("comparing calibrations, which takes some seconds ...")
     return answer(asked, given["seed"], given["replicates"])
@@ -186,7 +186,7 @@ class CalibrationKind:
         if not self.least <= n <= self.most:
             return None
         search = self.search(n)
-        directions = search.optimum(n, starts, bounded=False).directions.tolist()
+        directions = search.optimum(n, starts).tolist()
         content = {"title": MINIMAX, "source": "accelstudy plan", "directions": directions}
         scheme = parse_scheme(content, f"{MINIMAX}-{n}")
         alone = replace(self.question, holds=(self.hold,), equipment=(self.equipment,))

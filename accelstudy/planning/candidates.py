@@ -188,14 +188,9 @@ def tilt_of(
 ) -> Tilt | None:
     """Tilt error that a model leaves beside effects of some sizes, SI; None if undetermined."""
     _, columns = every_effect()
-    estimated = [i for effect in names_of(model) for i in columns[effect]]
+    estimated = [i for effect in model.effect_names for i in columns[effect]]
     neglected = {effect: (columns[effect], size) for effect, size in sizes.items()}
     return information.tilt(error_up_to(question.tilt_range), estimated, neglected)
-
-
-def names_of(model: SensorModel) -> tuple[str, ...]:
-    """Names of the effects of a model."""
-    return tuple(effect.name for effect in model.effects)
 
 
 def sigma_of(question: Question, equipment: Equipment, n: int, hold: float) -> float:

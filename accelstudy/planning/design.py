@@ -2,11 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Mapping
-from contextlib import contextmanager
+from collections.abc import Iterable, Mapping
+from contextlib import AbstractContextManager
 from dataclasses import replace
 from functools import cached_property
-from os import PathLike
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -18,7 +17,7 @@ from numpy.typing import NDArray
 from accelstudy import __version__
 from accelstudy.approaches import get_approach
 from accelstudy.basics import bounds, units
-from accelstudy.basics.arguments import path_of, tidy
+from accelstudy.basics.arguments import tidy
 from accelstudy.basics.errors import InputError, key
 from accelstudy.basics.names import path_name
 from accelstudy.basics.progress import say, show, stage
@@ -42,6 +41,15 @@ Array = NDArray[np.float64]
 REFERENCE = "mclaren-24"
 
 
+def new_scheme(
+    out: Path, inputs: Iterable[str | Path] = (), force: bool = False
+) -> AbstractContextManager[Path]:
+    """Return the place of a scheme, as which a file is known by its ending; see `new_file`."""
+    if not out.name.endswith((".yaml", ".yml")):
+        raise InputError(f"{out}: must end in .yaml, by which a file is known as a scheme")
+    return new_file(out, inputs, force)
+
+
 class Design(Result):
     """The best positions for a calibration, in the order in which to take them.
 
@@ -49,16 +57,13 @@ class Design(Result):
     ----------
     search : accelstudy.design.search.Search
     directions : (n, 3) array of unit vectors, in the order of measurement, as in the file
-    efficiency : float, least share of the best that as many positions can reach; NaN if unknown
     asked : mapping, texts and numbers that were given: attitudes, after, starts
     """
 
-    size = FULL, 80.0
+    new_file, size = staticmethod(new_scheme), (FULL, 80.0)
 
-    def __init__(
-        self, search: Search, directions: Array, efficiency: float, asked: Mapping[str, Any]
-    ) -> None:
-        self.search, self.directions, self.efficiency = search, directions, efficiency
+    def __init__(self, search: Search, directions: Array, asked: Mapping[str, Any]) -> None:
+        self.search, self.directions = search, directions
         self.asked, self.name = asked, f"{len(directions)} positions"
 
     @classmethod
@@ -67,9 +72,9 @@ class Design(Result):
         with stage("search"):
             search = search_for(**given)
             found = search.optimum(positions, starts)
-            order = field_order(search.task, found.directions)
+            order = field_order(search.task, found)
         asked = {"attitudes": given["attitudes"], "after": given["after"], "starts": starts}
-        return cls(search, found.directions[order], found.efficiency, asked)
+        return cls(search, found[order], asked)
 
     @property
     def state(self) -> str:
@@ -92,6 +97,11 @@ class Design(Result):
     def rms(self) -> Array:
         """Expected rms of roll and of pitch, rad, (2,)."""
         return rms_tilt(self.search.task, self.directions)
+
+    @cached_property
+    def efficiency(self) -> float:
+        """Least share that the positions reach of the best that as many positions can."""
+        return self.search.efficiency(self.directions)
 
     @property
     def provenance(self) -> dict[str, Any]:
@@ -118,7 +128,7 @@ class Design(Result):
             "rms_roll_mgon": tidy(self.rms[0] / units.MGON, 6),
             "rms_pitch_mgon": tidy(self.rms[1] / units.MGON, 6),
         }
-        return {k: v for k, v in content.items() if v not in (None, [], 0.0) and v == v}
+        return {k: v for k, v in content.items() if v not in (None, [], 0.0)}
 
     def to_frame(self) -> pd.DataFrame:
         """Return the positions, with angles in the unit that the names say."""
@@ -174,25 +184,11 @@ class Design(Result):
         yield f"Expected rms of leveling for tilts up to {tilt}, with {noise}:"
         yield f"  these {self.name}{after}: {_both(self.rms)}"
         yield f"  the {reference.n_positions} of {REFERENCE}{after}: {theirs}"
-        if self.efficiency == self.efficiency:
-            yield (
-                f"Efficiency at least {100 * self.efficiency:.1f} % of the best that any "
-                f"{len(self.directions)} allowed positions can reach "
-                f"({self.search.criterion.text})."
-            )
+        yield (
+            f"Efficiency at least {100 * self.efficiency:.1f} % of the best that any "
+            f"{len(self.directions)} allowed positions can reach ({self.search.criterion.text})."
+        )
         yield f"Noise of a leveled reading comes on top. {units.angle_note()}."
-
-    def save(self, path: str | PathLike[str], *, force: bool = False) -> None:
-        """Write the YAML file of a scheme.
-
-        Parameters
-        ----------
-        path : path, ending in .yaml
-        force : bool, whether to replace a file that is there
-        """
-        place = path_of("path", path)
-        with new_scheme(place, [], force) as file:
-            self.write(file, place)
 
     def write(self, file: Path, place: Path) -> None:
         """Write a file that becomes `place`, by which the scheme is named."""
@@ -229,15 +225,6 @@ def search_for(
     )
     allowed = replace(find_attitudes(attitudes, SPACES), **constraints)
     return Search(task, get_criterion(criterion, task), allowed, seed)
-
-
-@contextmanager
-def new_scheme(out: Path, inputs: Iterable[str | Path], force: bool) -> Iterator[Path]:
-    """Yield a temporary file that becomes `out`, by whose ending it is known as a scheme."""
-    if not out.name.endswith((".yaml", ".yml")):
-        raise InputError(f"{out}: must end in .yaml, by which a file is known as a scheme")
-    with new_file(out, inputs, force) as file:
-        yield file
 
 
 def _both(rms: Any) -> str:

@@ -11,13 +11,13 @@ REPLICATES = (20, 1_000_000)
 """From how many to how many positions may be the most, and candidates may be simulated."""
 
 QUANTITIES = {
-    "tilt_accuracy": InputQuantity("rad", "", 1e-4 * MGON, 100 * GON),
-    "tilt_range": InputQuantity("rad", "", 0.1 * GON, 90 * GON),
-    "sigma": InputQuantity("m/s^2", "", 1e-9, 10.0),
-    "hold": InputQuantity("s", "", 0.01, DAY),
-    "max_time": InputQuantity("s", "", 0.01, DAY),
-    "moving_time": InputQuantity("s", "20s", most=3600.0),
-    "robot_moving_time": InputQuantity("s", "10s", most=3600.0),
-    "robot_setup_time": InputQuantity("s", "30min", most=DAY),
-    "robot_sigma": InputQuantity("rad", "3.2mgon", 1e-6 * MGON, 10 * GON),
+    "tilt_accuracy": InputQuantity("rad", 1e-4 * MGON, 100 * GON),
+    "tilt_range": InputQuantity("rad", 0.1 * GON, 90 * GON),
+    "sigma": InputQuantity("m/s^2", 1e-9, 10.0),
+    "hold": InputQuantity("s", 0.01, DAY),
+    "max_time": InputQuantity("s", 0.01, DAY),
+    "moving_time": InputQuantity("s", most=3600.0),
+    "robot_moving_time": InputQuantity("s", most=3600.0),
+    "robot_setup_time": InputQuantity("s", most=DAY),
+    "robot_sigma": InputQuantity("rad", 1e-6 * MGON, 10 * GON),
 }

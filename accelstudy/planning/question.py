@@ -9,7 +9,6 @@ from typing import TYPE_CHECKING
 
 from accelstudy.data_sheets import DataSheet
 from accelstudy.effects import get_effect
-from accelstudy.planning.quantities import QUANTITIES
 
 if TYPE_CHECKING:
     from accelstudy.leveling.distribution import Tilt
@@ -49,12 +48,6 @@ class Equipment:
         return self.setup + positions * (hold + self.moving)
 
 
-BY_HAND = Equipment("gravity", QUANTITIES["moving_time"].value, 0.0)
-ROBOT = Equipment(
-    "robot", QUANTITIES["robot_moving_time"].value, QUANTITIES["robot_setup_time"].value
-)
-
-
 @dataclass(frozen=True)
 class Question:
     """The question that a plan answers, in SI.
@@ -65,22 +58,22 @@ class Question:
     tilt_range : float, rad
     sheet : DataSheet
     equipment : tuple of Equipment
+    sigma_angle : float, rad, of the robot's roll and pitch
+    most_positions : int
     confidence : float, share of the calibrations that must reach the target; None for the rms
     holds : tuple of float, s, durations that are tried
-    sigma_angle : float, rad, of the robot's roll and pitch
     most_seconds : float, s in the field
-    most_positions : int
     """
 
     target: float
     tilt_range: float
     sheet: DataSheet
-    equipment: tuple[Equipment, ...] = (BY_HAND, ROBOT)
+    equipment: tuple[Equipment, ...]
+    sigma_angle: float
+    most_positions: int
     confidence: float | None = None
     holds: tuple[float, ...] = ()
-    sigma_angle: float = QUANTITIES["robot_sigma"].value
     most_seconds: float = math.inf
-    most_positions: int = 200
 
     def __post_init__(self) -> None:
         if not self.holds:

@@ -16,7 +16,6 @@ from accelstudy.planning.candidates import (
     error_up_to,
     every_effect,
     information_of,
-    names_of,
     tilt_of,
 )
 from accelstudy.planning.question import NONLINEAR, Question
@@ -83,7 +82,7 @@ def limits(question: Question, candidate: Candidate) -> str:
 
 def spoilers(question: Question, candidate: Candidate) -> list[Spoiler]:
     """Sizes at which effects that are not in the model would by themselves use up the target."""
-    inside = names_of(candidate.model)
+    inside = candidate.model.effect_names
     effects = [e for e in NONLINEAR if e not in inside]
     if candidate.equipment.name == "robot":
         # Without a robot the mounting of the sensor neither shows nor does harm.

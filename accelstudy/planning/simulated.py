@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from accelstudy.approaches import get_approach
 from accelstudy.basics.units import STANDARD_GRAVITY
 from accelstudy.effects import get_effect
-from accelstudy.planning.candidates import Candidate, names_of
+from accelstudy.planning.candidates import Candidate
 from accelstudy.planning.question import NONLINEAR, Question, usual_size
 from accelstudy.simulation.hold_plan import HoldPlan
 from accelstudy.simulation.sessions import Noise
@@ -70,7 +70,7 @@ def cell_of(question: Question, candidate: Candidate, replicates: int) -> Cell:
     return Cell(
         name="/".join([model.name, scheme.name, equipment]),
         model=model.name,
-        effects=names_of(model),
+        effects=model.effect_names,
         simulated_effects=tuple(sizes),
         scheme=scheme.name,
         approach=equipment,

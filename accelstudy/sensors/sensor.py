@@ -68,6 +68,11 @@ class SensorModel:
         return tuple(p.name for p in self.parameters)
 
     @property
+    def effect_names(self) -> tuple[str, ...]:
+        """Names of its effects."""
+        return tuple(effect.name for effect in self.effects)
+
+    @property
     def parts(self) -> Iterator[tuple[Effect, slice]]:
         """Each effect, and where its parameters stand in a vector (u,)."""
         first = 0

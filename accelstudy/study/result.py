@@ -281,7 +281,7 @@ def _with_truth(cells: Sequence[Cell], truth: Mapping[str, float | str] | None) 
     for name, value in (truth or {}).items():
         if name not in units:
             raise UnknownNameError("parameter of the truth", name, units)
-        values[name] = quantity(f"truth: {name}", value, InputQuantity(units[name], "", -inf))
+        values[name] = quantity(f"truth: {name}", value, InputQuantity(units[name], -inf))
     return [
         replace(cell, truth={**cell.truth, **{k: v for k, v in values.items() if k in cell.truth}})
         for cell in cells

@@ -164,12 +164,12 @@ def pairs(example: str) -> Kind:
 
 def si(unit: str, least: float, most: float) -> InputQuantity:
     """Quantity of which a number without a unit is in SI, on the command line, too."""
-    return InputQuantity(unit, "", least, most, bare=True)
+    return InputQuantity(unit, least, most, bare=True)
 
 
 def angle(least: float, most: float) -> InputQuantity:
     """Angle with its unit; a number is in rad."""
-    return InputQuantity("rad", "", least, most)
+    return InputQuantity("rad", least, most)
 
 
 Quantity = float | str

@@ -59,8 +59,7 @@ def efficiency_table(
         }
         shown = {scheme.title: scheme.directions for scheme in schemes}
         for n in positions:
-            best = Search(task, criteria["I"], seed=SEED).optimum(n, bounded=False)
-            shown[f"{n} I-optimal"] = best.directions
+            shown[f"{n} I-optimal"] = Search(task, criteria["I"], seed=SEED).optimum(n)
         for i, (title, directions) in enumerate(shown.items()):
             n, reason = len(directions), task.missing(directions)
             row = {

@@ -16,7 +16,7 @@ from accelstudy.campaign.format import write_campaign
 from accelstudy.data_sheets import sheet_of_sigma
 from accelstudy.leveling.error import cap_forces
 from accelstudy.planning.candidates import in_scheme
-from accelstudy.planning.question import BY_HAND, Question
+from accelstudy.planning.question import Equipment, Question
 from accelstudy.schemes import get_scheme
 from accelstudy.sensors.models import get_model
 
@@ -56,7 +56,8 @@ def test_nine_positions_of_rank_eight(tmp_path, directions):
     scheme.write_text(
         yaml.safe_dump({"scheme": "nine", "directions": np.tile(directions, (2, 1)).tolist()})
     )
-    question = Question(10 * MGON, 30 * GON, sheet_of_sigma(0.002), (BY_HAND,))
+    by_hand = Equipment("gravity", 20.0, 0.0)
+    question = Question(10 * MGON, 30 * GON, sheet_of_sigma(0.002), (by_hand,), 0.0, 200)
     models = [get_model("bias-scale-nonorthogonality")]
     planned = [*in_scheme(question, get_scheme(str(scheme)), models)]
     assert all(each.tilt.rms.max() > 1 * GON for each in planned)

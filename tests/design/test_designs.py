@@ -172,7 +172,7 @@ def test_contradictory_wishes_are_said_in_one_line(given, wrong):
 
 def test_what_was_measured_before():
     after = asked(approach="gravity", after="faces-6")
-    assert after.task.missing(after.optimum(6, 1, bounded=False).directions) == ""
+    assert after.task.missing(after.optimum(6, 1)) == ""
 
 
 def test_the_order_is_a_round_trip_of_small_turns():

@@ -20,13 +20,11 @@ DECIMALS = 6
 def searched(name, n):
     """Positions that are found, their efficiency, and the bound of the criterion."""
     criterion = get_criterion(name, TASK)
-    found = Search(TASK, criterion).optimum(n)
-    directions = (found.directions.round(DECIMALS) + 0.0).tolist()
-    value = float(criterion.value(TASK.normal(directions)))
-    efficiency = criterion.efficiency(value, found.bound)
+    search = Search(TASK, criterion)
+    directions = (search.optimum(n).round(DECIMALS) + 0.0).tolist()
     return {
-        "efficiency": round(efficiency, 5),
-        "bound": round(found.bound, 5),
+        "efficiency": round(search.efficiency(directions), 5),
+        "bound": round(search.bound(n), 5),
         "directions": directions,
     }
 

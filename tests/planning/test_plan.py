@@ -27,7 +27,7 @@ from accelstudy.planning import candidates as known
 from accelstudy.planning.answer import CalibrationKind, answer
 from accelstudy.planning.candidates import candidates, information_of, tilt_of
 from accelstudy.planning.plan import PlanDocument
-from accelstudy.planning.question import BY_HAND, ROBOT, Question
+from accelstudy.planning.question import Equipment, Question
 from accelstudy.planning.reasons import errors_in_use, limits, spoilers
 from accelstudy.planning.simulated import cell_of
 from accelstudy.planning.wording import SENTENCES, part_lines, table_lines
@@ -72,8 +72,12 @@ def plan(told):
     return told[0]
 
 
-def asked(sheet=None, **options):
-    return Question(10 * MGON, 30 * GON, sheet or sheet_of_sigma(0.002), **options)
+BY_HAND, ROBOT = Equipment("gravity", 20.0, 0.0), Equipment("robot", 10.0, 1800.0)
+
+
+def asked(sheet=None, target=10 * MGON, tilt_range=30 * GON, equipment=(BY_HAND, ROBOT), **more):
+    options = {"sigma_angle": 3.2 * MGON, "most_positions": 200, **more}
+    return Question(target, tilt_range, sheet or sheet_of_sigma(0.002), equipment, **options)
 
 
 # --- linear theory -------------------------------------------------------------------------------
@@ -240,7 +244,7 @@ def test_set_up_is_told_in_its_own_unit():
     (7, {"most_positions": 20, "equipment": (BY_HAND,)}, "with at most 20 positions by hand"),
 ])  # fmt: skip
 def test_what_cannot_be_reached_is_one_line_with_what_can(target, options, said):
-    question = Question(target * MGON, 30 * GON, sheet_of_sigma(0.002), **options)
+    question = asked(target=target * MGON, **options)
     result = answer(question, replicates=200)
     assert result.ranked == []
     (line,) = part_lines("answer", result)
@@ -360,7 +364,7 @@ def test_one_position_less_does_not_suffice(plan):
 
 def test_the_fewest_positions_suffice_although_the_model_lacks_effects():
     bent = DataSheet("s", position_sigma=SIGMA, nonlinearity=0.001, full_scale=19.6133)
-    question = Question(20 * MGON, 50 * GON, bent, (BY_HAND,), holds=(10.0,))
+    question = asked(bent, 20 * MGON, 50 * GON, (BY_HAND,), holds=(10.0,))
     kind = CalibrationKind(question, BY_HAND, NINE, 10.0)
     found = kind.fewest(kind.best(20))
     assert np.sqrt(found.tilt.squares["quadratic_scale"].max()) > 0.2 * question.target
@@ -369,7 +373,7 @@ def test_the_fewest_positions_suffice_although_the_model_lacks_effects():
 
 
 def test_a_share_of_the_calibrations_is_of_both_angles_at_once():
-    question = Question(20 * MGON, 30 * GON, sheet_of_sigma(SIGMA), (BY_HAND,), confidence=0.95)
+    question = asked(target=20 * MGON, equipment=(BY_HAND,), confidence=0.95)
     found = answer(question, replicates=4000).first
     n = found.scheme.n_positions
     kind = CalibrationKind.of(question, found)
@@ -395,7 +399,7 @@ def test_with_a_robot_five_positions_do_what_four_do_not(plan):
 @pytest.mark.parametrize(("tilt_range", "kelvin"), [(30, 10), (60, 25)])
 def test_temperature_in_use_leaves_what_warmed_sensors_do(name, tilt_range, kelvin):
     sheet = get_data_sheet(name)
-    question = Question(10 * MGON, tilt_range * GON, sheet)
+    question = asked(sheet, tilt_range=tilt_range * GON)
     f, weights = attitudes(tilt_range * GON)
     bias, scale = np.random.default_rng(3).standard_normal((2, REPLICATES, 1, 3))
     bias *= kelvin * (sheet.bias_per_kelvin or 0)

@@ -37,7 +37,7 @@ from accelstudy.pages import write_page
 from accelstudy.pages.result import Result
 from accelstudy.sensors.frames import axes_note
 
-TILT = InputQuantity("rad", "", 1e-3, np.pi / 2)
+TILT = InputQuantity("rad", 1e-3, np.pi / 2)
 MAX_ROWS = 200
 """Positions up to which the page lists all of them; of more, those that fit worst."""
 

@@ -230,7 +230,7 @@ def condition_sigma(solution: Solution, variance: float) -> float:
 def model_file(diagnosis: CampaignDiagnosis) -> dict[str, Any]:
     """Return the content of model.yaml: the extended model, for wherever a model is asked for."""
     base, extended = diagnosis.model, diagnosis.extended_model
-    added = [effect.name for effect in extended.effects[len(base.effects) :]]
+    added = extended.effect_names[len(base.effects) :]
     name = "-".join([re.sub(r"[^A-Za-z0-9_-]+", "-", composition_name(base.effects)), *added])
     if name in MODELS or len(name) > MAX_NAME_BYTES:
         name = "extended"

@@ -169,7 +169,7 @@ class SessionFit:
     @cached_property
     def tested(self) -> Candidates:
         """The effects that are not in the model, and bumped positions."""
-        modelled = {effect.name for effect in self.solution.model.effects}
+        modelled = {*self.solution.model.effect_names}
         by_sensor, redundancy = self.solution.observed.angle_errors, self.residuals.redundancy
         shapes, invisible, untestable = dict[str, Hypotheses](), [], {}
         for name in effect_names():
