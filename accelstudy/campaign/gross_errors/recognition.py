@@ -7,11 +7,11 @@ a function that yields its corrections.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Generator, Iterable, Iterator, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field, replace
 from functools import partial
 from itertools import chain, permutations, product
-from typing import NamedTuple
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -63,8 +63,9 @@ class Correction:
     Attributes
     ----------
     name : str, of the gross error
-    reason : str, what is wrong, in words
-    campaign : Campaign, mended
+    reason : str, what is wrong, in words; empty if nothing is
+    arrays : mapping, arrays of the campaign that change
+    header : mapping, keys of its header that change
     matrix : (3, 3) array, turns forces as they were read into mended ones; None if it is I
     changed : (n,) bool array, which positions change; None if all do
     left_out : tuple of int, positions that cannot be mended
@@ -72,10 +73,17 @@ class Correction:
 
     name: str
     reason: str
-    campaign: Campaign
+    arrays: Mapping[str, Any] = field(default_factory=dict)
+    header: Mapping[str, Any] = field(default_factory=dict)
     matrix: Array | None = None
     changed: NDArray[np.bool_] | None = None
     left_out: tuple[int, ...] = ()
+
+    def apply(self, campaign: Campaign) -> Campaign:
+        """Undo the error in a campaign."""
+        mended = campaign.with_arrays(**self.arrays) if self.arrays else campaign
+        mended = mended.with_header(**self.header) if self.header else mended
+        return mended.without(dict.fromkeys(self.left_out, self.reason))
 
 
 @dataclass(frozen=True)
@@ -85,9 +93,11 @@ class Recognition:
     Attributes
     ----------
     errors : tuple of Correction, one after the other
+    corrected : Campaign, with the errors undone
     """
 
     errors: tuple[Correction, ...]
+    corrected: Campaign
 
     @property
     def names(self) -> tuple[tuple[str, int | None], ...]:
@@ -106,11 +116,6 @@ class Recognition:
     def reason(self) -> str:
         """All that is wrong, in words."""
         return "; ".join(error.reason for error in self.errors)
-
-    @property
-    def corrected(self) -> Campaign:
-        """The campaign with its errors undone."""
-        return self.errors[-1].campaign
 
     @property
     def matrix(self) -> Array | None:
@@ -201,7 +206,9 @@ def check_plausible(campaign: Campaign, where: str, angle_unit: str = "gon") -> 
     doubts = check_size(where, campaign.forces, campaign.gravity, unit, conversion)
     if campaign.angles is None:
         return doubts
-    for error in _everywhere(campaign, True, angle_unit):
+    errors: list[Correction] = []
+    _everywhere(campaign, True, errors, angle_unit)
+    for error in errors:
         if error.name == "unit_error":
             raise InputError(f"{where}: {error.reason}, not in {angle_unit}")
         if error.matrix is not None and np.array_equal(error.matrix, -np.eye(3)):
@@ -232,50 +239,47 @@ def recognise(campaign: Campaign, attitude: bool = True) -> Recognition | None:
     InputError
         If the forces are nowhere near gravity and no unit explains it.
     """
-    errors = tuple(_corrections(campaign, attitude and campaign.angles is not None))
-    forces = errors[-1].campaign.forces if errors else campaign.forces
-    where, si = f"{campaign.name}: fx, fy, fz", conversion_of("m/s^2")
-    check_size(where, forces, campaign.gravity, "m/s^2", si)
-    return Recognition(errors) if errors else None
-
-
-def _corrections(campaign: Campaign, attitude: bool) -> Iterator[Correction]:
-    """Yield the corrections of gross errors, first of those that all positions have."""
-    sensor = yield from _everywhere(campaign, attitude)
+    errors: list[Correction] = []
+    sensor = _everywhere(campaign, attitude and campaign.angles is not None, errors)
     # A sensor that is mounted askew is no reason to reorder its positions.
     sensor = sensor.free if sensor.is_askew else sensor
     # A row that was not exchanged may still be wrong by itself.
     for alone in (rows, outliers):
-        sensor = yield from _undo(sensor, alone)
+        sensor = _undo(sensor, errors, alone)
+    where, si = f"{campaign.name}: fx, fy, fz", conversion_of("m/s^2")
+    check_size(where, sensor.campaign.forces, campaign.gravity, "m/s^2", si)
+    return Recognition(tuple(errors), sensor.campaign) if errors else None
 
 
 def _everywhere(
-    campaign: Campaign, attitude: bool, angle_unit: str = "gon"
-) -> Generator[Correction, None, RealSensor]:
-    """Undo a wrong unit and wrong axes, which all positions have; return the sensor after it."""
+    campaign: Campaign, attitude: bool, errors: list[Correction], angle_unit: str = "gon"
+) -> RealSensor:
+    """Undo a wrong unit and wrong axes, which all positions have, and append them to `errors`."""
     other_units = partial(units, angle_unit=angle_unit)
     # The norm shows a wrong unit even if the axes are wrong, so gravity comes before the attitudes.
-    sensor = yield from _undo(RealSensor(campaign, False), other_units)
+    sensor = _undo(RealSensor(campaign, False), errors, other_units)
     if attitude:
-        return (yield from _undo(replace(sensor, attitude=True), axes, other_units))
-    return (yield from _undo(sensor, columns_of_counts))
+        return _undo(replace(sensor, attitude=True), errors, axes, other_units)
+    return _undo(sensor, errors, columns_of_counts)
 
 
 def _undo(
-    sensor: RealSensor, *hypotheses: Callable[[RealSensor], Iterator[Correction]]
-) -> Generator[Correction, None, RealSensor]:
-    """Yield what helps most first, until nothing helps clearly; return the sensor after it."""
+    sensor: RealSensor,
+    errors: list[Correction],
+    *hypotheses: Callable[[RealSensor], Iterator[Correction]],
+) -> RealSensor:
+    """Undo what helps most first, until nothing helps clearly; return the sensor after it."""
     for _ in range(MAX_ERRORS):
-        helps = [
-            (correction, after)
-            for correction in chain.from_iterable(each(sensor) for each in hypotheses)
-            if _is_clear(correction, sensor, after := replace(sensor, campaign=correction.campaign))
+        tried = [
+            (one, replace(sensor, campaign=one.apply(sensor.campaign)))
+            for one in chain.from_iterable(each(sensor) for each in hypotheses)
         ]
+        helps = [(one, after) for one, after in tried if _is_clear(one, sensor, after)]
         if not helps:
             break
         least = min(after.misfit for _, after in helps)
         best, sensor = next(one for one in helps if one[1].misfit <= AS_GOOD * least)
-        yield best
+        errors.append(best)
     return sensor
 
 
@@ -295,37 +299,6 @@ def _is_clear(correction: Correction, before: RealSensor, after: RealSensor) -> 
 # --- What would mend a campaign, the simplest first -----------------------------------------------
 
 
-class Exchange(NamedTuple):
-    """Undoing of an exchange of axes, or of columns of counts.
-
-    Attributes
-    ----------
-    reason : str, what is exchanged; empty if nothing is
-    forces : (n, 3) array, m/s², mended
-    matrix : (3, 3) array, turns forces as they were read into mended ones, but for an offset
-    offset : (3,) array, counts at 0 m/s² of the mended axes; None if it stays
-    """
-
-    reason: str
-    forces: Array
-    matrix: Array
-    offset: Array | None = None
-
-    def correct(self, campaign: Campaign) -> Correction:
-        """Undo the exchange in a campaign."""
-        sd = None if campaign.sd is None else np.abs(_permuted(campaign.sd, self.matrix))
-        mended = campaign.with_arrays(forces=self.forces, sd=sd)
-        if self.offset is not None:
-            header = campaign.header
-            scale, log = header.conversion("forces").scale, header.log
-            if log is not None:
-                in_its_axes = self.offset[np.argsort(log.axes.order)].tolist()
-                log = log.model_copy(update={"offset": in_its_axes})
-            nominal = {"scale": scale.tolist(), "offset": self.offset.tolist()}
-            mended = mended.with_header(nominal=nominal, log=log)
-        return Correction("axis_error", self.reason, mended, self.matrix)
-
-
 def axes(sensor: RealSensor) -> Iterator[Correction]:
     """Undo each of the 47 exchanges of axes that are likely."""
     campaign = sensor.campaign
@@ -335,20 +308,19 @@ def axes(sensor: RealSensor) -> Iterator[Correction]:
     # An ideal sensor with any bias is near enough to compare all quickly.
     tried, misses = [], []
     for shown in SIGNED_PERMUTATIONS:
-        for exchange in _exchanges(campaign, shown):
-            error = exchange.forces - ideal
+        for correction in _exchanges(campaign, shown):
+            error = correction.arrays["forces"] - ideal
             bias = np.median(error, axis=0)
             distance = np.linalg.norm(error - bias, axis=1)
             misses.append(float(np.mean(np.minimum(distance, campaign.gravity))))
             moved = sum(abs(axis) != i for i, axis in enumerate(shown, 1))
             changes = (moved, sum(axis < 0 for axis in shown), float(np.linalg.norm(bias)))
-            tried.append((changes, exchange))
+            tried.append((changes, correction))
     near = [
         one for one, miss in zip(tried, misses, strict=True) if miss < MAX_AXIS_RATIO * min(misses)
     ]
-    simplest = sorted(near, key=lambda one: one[0])
-    yield from (exchange.correct(campaign) for _, exchange in simplest if exchange.reason)
-    exchanged = campaign.with_arrays(angles=campaign.angles[:, ::-1])
+    yield from (one for _, one in sorted(near, key=lambda one: one[0]) if one.reason)
+    exchanged = {"angles": campaign.angles[:, ::-1]}
     yield Correction("axis_error", "roll and pitch of the robot are exchanged", exchanged)
 
 
@@ -361,33 +333,49 @@ def columns_of_counts(sensor: RealSensor) -> Iterator[Correction]:
     if campaign.header.nominal is None or not sensor.tells or sensor.strangeness <= 1:
         return
     corrections = [
-        exchange.correct(campaign)
+        one
         for shown in SIGNED_PERMUTATIONS
         if min(shown) > 0
-        for exchange in _exchanges(campaign, shown)
-        if exchange.offset is not None
+        for one in _exchanges(campaign, shown)
+        if one.header
     ]
-    strangeness = [replace(sensor, campaign=one.campaign).strangeness for one in corrections]
+    sensors = (replace(sensor, campaign=one.apply(campaign)) for one in corrections)
+    strangeness = [each.strangeness for each in sensors]
     if min(strangeness, default=np.inf) <= 1:
         yield corrections[int(np.argmin(strangeness))]
 
 
-def _exchanges(campaign: Campaign, shown: Sequence[int]) -> Iterator[Exchange]:
+def _exchanges(campaign: Campaign, shown: Sequence[int]) -> Iterator[Correction]:
     """Undo an exchange of axes, and one of columns of counts, before nominal scales and offsets."""
-    matrix = matrix_of(shown).T
+    matrix = np.zeros((3, 3))
+    matrix[np.abs(shown) - 1, range(3)] = np.sign(shown)
     reason = _axes_in_words(matrix) if np.any(matrix != np.eye(3)) else ""
-    yield Exchange(reason, _permuted(campaign.forces, matrix), matrix)
+    yield Correction("axis_error", reason, _times(campaign, matrix), matrix=matrix)
     if campaign.header.nominal is None or not reason:
         return
     # Counts P r, read with S and o, were r: S (r − o) = S P S⁻¹ · S (P⁻¹ r − P⁻¹ o).
-    nominal = campaign.header.conversion("forces")
+    nominal, log = campaign.header.conversion("forces"), campaign.header.log
     scaled = matrix * nominal.scale[:, None] / nominal.scale
     offset = np.abs(matrix).T @ nominal.offset
     if np.allclose(scaled, matrix) and np.array_equal(offset, nominal.offset):
         return
-    forces = _permuted(campaign.forces + (nominal.offset - offset) * nominal.scale, scaled)
+    if log is not None:
+        log = log.model_copy(update={"offset": offset[np.argsort(log.axes.order)].tolist()})
+    header = {"nominal": {"scale": nominal.scale.tolist(), "offset": offset.tolist()}, "log": log}
+    arrays = _times(campaign, scaled, (nominal.offset - offset) * nominal.scale)
     reason += ", in the counts, before `scale` and `offset`"
-    yield Exchange(reason, forces, scaled, offset)
+    yield Correction("axis_error", reason, arrays, header, scaled)
+
+
+def _times(campaign: Campaign, matrix: Array, shift: Array | float = 0.0) -> dict[str, Array]:
+    """What is read after f → P (f + s), where P takes each axis from one other; sds have no sign.
+
+    Columns are reordered, not summed, so no digit changes.
+    """
+    axes = np.argmax(np.abs(matrix), axis=1)
+    factors = matrix[range(3), axes]
+    arrays = {"forces": factors * (campaign.forces + shift)[:, axes]}
+    return arrays if campaign.sd is None else arrays | {"sd": abs(factors) * campaign.sd[:, axes]}
 
 
 def _axes_in_words(matrix: Array) -> str:
@@ -415,11 +403,13 @@ def units(sensor: RealSensor, angle_unit: str = "gon") -> Iterator[Correction]:
                 instead = "" if stated == "m/s^2" else f", not in {stated}"
                 matrix = factor * np.eye(3)
                 reason = f"the forces are in {unit}{instead}"
-                yield Correction("unit_error", reason, permute_axes(campaign, matrix), matrix)
+                yield Correction("unit_error", reason, _times(campaign, matrix), matrix=matrix)
     if sensor.expected is not None:
         for unit, factor in other_units(ROBOT_UNITS, "rad", angle_unit).items():
             reason = f"the robot's angles are in {ROBOT_UNITS[unit]}"
-            yield Correction("unit_error", reason, angles_times(campaign, factor))
+            angles = {"angles": campaign.angles, "yaw": campaign.yaw}
+            arrays = {name: factor * a for name, a in angles.items() if a is not None}
+            yield Correction("unit_error", reason, arrays)
 
 
 def rows(sensor: RealSensor) -> Iterator[Correction]:
@@ -443,7 +433,9 @@ def rows(sensor: RealSensor) -> Iterator[Correction]:
     if moved.any():
         positions = short_list([*map(str, campaign.positions[moved])])
         reason = f"the forces of positions {positions} are exchanged"
-        yield Correction("row_order", reason, reorder_rows(campaign, order), changed=moved)
+        read = {"forces": campaign.forces, "sd": campaign.sd, "n_samples": campaign.n_samples}
+        arrays = {name: a[order] for name, a in read.items() if a is not None}
+        yield Correction("row_order", reason, arrays, changed=moved)
 
 
 def outliers(sensor: RealSensor) -> Iterator[Correction]:
@@ -460,42 +452,7 @@ def outliers(sensor: RealSensor) -> Iterator[Correction]:
     reason = f"positions {positions} are wrong by up to {size:.2g} m/s^2"
     if len(bumped) == 1:
         reason = f"position {positions} is wrong by {size:.2g} m/s^2"
-    left = campaign.without(dict.fromkeys(bumped, reason))
-    yield Correction("outlier_position", reason, left, left_out=bumped)
-
-
-# --- What undoes them ---------------------------------------------------------------------------
-
-
-def matrix_of(shown: Sequence[float]) -> Array:
-    """P of what the channels show: f → P f."""
-    matrix = np.zeros((3, 3))
-    matrix[range(3), np.abs(shown).astype(int) - 1] = np.sign(shown)
-    return matrix
-
-
-def _permuted(values: Array, matrix: Array) -> Array:
-    """Apply f → P f to (n, 3); columns are reordered, not summed, so no digit changes."""
-    axes = np.argmax(np.abs(matrix), axis=1)
-    return np.asarray(matrix[range(3), axes] * values[:, axes])
-
-
-def permute_axes(campaign: Campaign, matrix: Array) -> Campaign:
-    """Return the campaign with f → P f; sds have no sign."""
-    return Exchange("", _permuted(campaign.forces, matrix), matrix).correct(campaign).campaign
-
-
-def reorder_rows(campaign: Campaign, order: NDArray[np.int_]) -> Campaign:
-    """Return the campaign with the readings in another order."""
-    read = {"forces": campaign.forces, "sd": campaign.sd, "n_samples": campaign.n_samples}
-    arrays = {name: array[order] for name, array in read.items() if array is not None}
-    return campaign.with_arrays(**arrays)
-
-
-def angles_times(campaign: Campaign, factor: float) -> Campaign:
-    """Return the campaign with the robot's angles multiplied by a factor."""
-    arrays = {"angles": campaign.angles, "yaw": campaign.yaw}
-    return campaign.with_arrays(**{k: factor * v for k, v in arrays.items() if v is not None})
+    yield Correction("outlier_position", reason, left_out=bumped)
 
 
 def other_units(units: Iterable[str], quantity: str, stated: str) -> dict[str, float]:
