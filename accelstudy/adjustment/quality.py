@@ -268,6 +268,11 @@ class GlobalTest(NamedTuple):
         few = self.sigma_dof < HARDLY_KNOWN
         return f"{self.sigma_dof:.0f} degrees of freedom of sigma" if few else ""
 
+    @property
+    def remark(self) -> str:
+        """Why the test has no power, in words; empty if it has."""
+        return f"{self.lacking}: the test has next to no power" if self.powerless else ""
+
 
 def global_test(
     omega: float,

@@ -7,7 +7,7 @@ import pandas as pd
 import pyarrow as pa
 import pyarrow.parquet as pq
 import pytest
-from campaign_helpers import simulated_campaign
+from campaign_helpers import simulated_campaign, with_keys
 from usual import NINE, ROBOT
 
 import accelstudy as acs
@@ -79,7 +79,7 @@ def test_sigmas_hold_where_the_sensor_loses_gain(plain):
     """Beyond a knee of 6 m/s² half the gain is left, so noise counts twice: σ/(½ g) in pitch."""
     model, g, noise = get_model("saturation(knee=6)"), 9.80665, 0.002
     calibration = replace(
-        plain, model=model, parameters=np.full(3, 0.5), covariance=np.zeros((3, 3)), gravity=g
+        plain, model=model, parameters=np.full(3, 0.5), covariance=np.zeros((3, 3))
     )
     attitude = np.array([0.0, 50 * GON])  # x and z feel 6.9 m/s²
     reading = model.sense(np.column_stack(specific_force(*attitude, g)), calibration.parameters, g)
@@ -159,7 +159,7 @@ def test_what_depends_on_conditions_is_corrected_by_those_of_the_row(effects, va
     stored = LogLayout(columns={c: c for c in ("temperature", "vibration")}, time=None)
     for known in (None, stored):
         with pytest.raises(InputError, match=rf"{effects.split('(')[0]} needs the {condition}.*`"):
-            leveled_rows(replace(own, log=known), rows[AXES])
+            leveled_rows(with_keys(own, log=known), rows[AXES])
 
 
 def test_a_lag_follows_the_thermometer():
@@ -228,7 +228,7 @@ def test_a_log_in_other_axes_is_leveled_in_them():
     scale, offset = np.array([0.01, 0.02, 0.005]), np.array([5.0, 6.0, 7.0])
     rows[AXES] = frame.from_frd(rows[AXES]) / scale + offset
     layout = LogLayout(unit="counts", scale=[*scale], offset=[*offset], frame="rfu")
-    table, _ = leveled_rows(replace(own, log=layout), rows)
+    table, _ = leveled_rows(with_keys(own, log=layout), rows)
     turned = frame.from_frd(calibrated_in(frd))
     np.testing.assert_allclose(calibrated_in(table), turned, atol=1e-8)
     for sign, angle in zip(frame.signs, ("roll", "pitch"), strict=False):
@@ -351,7 +351,7 @@ def test_a_log_without_names_is_written_with_places(plain, log, tmp_path, wanted
     forces = mixed_log()[AXES].to_numpy(float)
     np.savetxt(log, np.column_stack([forces, np.full(N, 5)]), "%.4f", delimiter=";")
     given = {"columns": {"fx": 0, "fy": "1", "fz": 2}}
-    known = replace(plain, log=LogLayout(**given, rate_hz=100))
+    known = with_keys(plain, log=LogLayout(**given, rate_hz=100))
     for calibration, *options in ((plain, given), (known,)):
         level_log(calibration, log, tmp_path / wanted, *options)
         read = pd.read_csv if ".csv" in wanted else pd.read_parquet
@@ -364,12 +364,12 @@ def test_a_log_without_names_is_written_with_places(plain, log, tmp_path, wanted
 def test_columns_of_the_campaign_that_a_log_lacks_are_said_to_come_from_there(plain, log, tmp_path):
     mixed_log().to_csv(log, index=False)
     layout = LogLayout(columns={"fx": "ax", "fy": "ay", "fz": "az", "temperature": "T"})
-    known = replace(plain, log=layout)
+    known = with_keys(plain, log=layout)
     with pytest.raises(InputError, match=r"no column 'ax'.*log of the campaign, `columns`"):
         level_log(known, log, tmp_path / "out.csv")
     # A temperature that no effect needs may be missing, unless it is asked for.
     layout = LogLayout(columns={"fx": "fx", "fy": "fy", "fz": "fz", "temperature": "T"})
-    known = replace(plain, log=layout)
+    known = with_keys(plain, log=layout)
     level_log(known, log, tmp_path / "out.csv")
     level_log(known, log, tmp_path / "out.csv", {"columns": {"temperature": "count"}})
 
@@ -381,7 +381,7 @@ def test_a_reading_at_the_end_of_the_range_is_no_measurement(plain, tmp_path):
     clipping = replace(
         plain, model=model, parameters=model.vector(values), covariance=np.zeros((12, 12))
     )
-    ranged = replace(plain, content={**plain.content, "range_mps2": 9.05})
+    ranged = with_keys(plain, range_mps2=9.05)
     (tmp_path / "log.csv").write_text("fx,fy,fz\n0,0,-9.05\n1,5,-8\n", encoding="utf-8")
     for known in (clipping, ranged):
         leveled = level_log(known, tmp_path / "log.csv", tmp_path / "out.csv")

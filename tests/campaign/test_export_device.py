@@ -5,16 +5,21 @@ import json
 import re
 import shutil
 import subprocess
-from dataclasses import replace
 from functools import cache
 
 import numpy as np
 import pytest
 from calling import refused, succeed
+from campaign_helpers import with_keys
 
 import accelstudy as acs
 from accelstudy.campaign.calibration.c_code import c_header
 from accelstudy.campaign.calibration.export import export, losses
+from accelstudy.campaign.calibration.file_format import (
+    CalibrationDocument,
+    Correction,
+    Quality,
+)
 from accelstudy.campaign.calibration.sensor_calibration import SensorCalibration
 from accelstudy.campaign.header import LogLayout
 from accelstudy.effects import HoldConditions, effect_names, get_effect
@@ -46,8 +51,8 @@ ALONE = [
 """Effects, some shapes of them, and some models."""
 CONTENT = {
     "campaign": "made", "sensor": "a */ b", "model": "m", "approach": "gravity",
-    "n_positions": 24, "quality": {"state": "accepted"}, "mended": None,
-    "sigma_reading_mps2": 0.01, "unit": "m/s^2", "nominal": None,
+    "n_positions": 24, "quality": Quality(state="accepted"), "sigma_reading_mps2": 0.01,
+    "unit": "m/s^2", "nominal": None, "gravity_mps2": G,
 }  # fmt: skip
 
 
@@ -59,7 +64,8 @@ def calibration_with(specs, ranges=RANGES, values=None):
         sizes = [np.minimum(e.typical[1], e.deviations) for e in model.effects]
         values = np.concatenate(sizes) * rng.choice([-1, 1], u)
     root = 0.1 * np.abs(values)[:, None] * (np.eye(u) + rng.uniform(-0.2, 0.2, (u, u)))
-    return SensorCalibration(model, np.array(values), root @ root.T, G, CONTENT, None, ranges)
+    document = CalibrationDocument.model_construct(**CONTENT, ranges=ranges)
+    return SensorCalibration(document, model, np.array(values), root @ root.T)
 
 
 def conditions(n, until=1000.0):
@@ -160,10 +166,10 @@ def single(tmp_path_factory):
     made = {specs: calibration_with(specs) for specs in PAIRS}
     made[CLIPS] = calibration_with(CLIPS, values=[1.0, 1.0, 1.0])
     linear = calibration_with(("bias", "scale", "nonorthogonality", "quadratic_scale"))
-    mended = {**CONTENT, "mended": {"matrix": TURN.tolist(), "reason": "x is y"}}
+    mended = Correction(error="axis_error", reason="x is y", matrix=TURN.tolist())
     for frame in FRAMES:
         layout = LogLayout(unit="counts", frame=frame, **COUNTS)
-        made[frame] = replace(linear, log=layout, content=mended)
+        made[frame] = with_keys(linear, log=layout, mended=mended)
     return Library(made, tmp_path_factory.mktemp("c"), double=False)
 
 
@@ -256,7 +262,7 @@ def calibration_of(model):
 
 def read_in(**layout):
     """The calibration of nine parameters, of a log with a layout."""
-    return replace(calibration_of(NINE).sensor, log=LogLayout(**layout))
+    return with_keys(calibration_of(NINE).sensor, log=LogLayout(**layout))
 
 
 NINE = "bias-scale-nonorthogonality"

@@ -1,5 +1,7 @@
 """A campaign as a sensor of the nine parameters would give it."""
 
+from dataclasses import replace
+
 import numpy as np
 from usual import NINE
 
@@ -33,6 +35,11 @@ def made(forces, gravity=STANDARD_GRAVITY, sigma=None, sigma_angle=None, header=
         "robot": None if sigma_angle is None else {"angle_sigma_mgon": sigma_angle / MGON},
     }
     return Campaign.of({**content, **dict(header)}, forces=forces, **arrays)
+
+
+def with_keys(calibration, **keys):
+    """The calibration of a sensor with other keys of its document."""
+    return replace(calibration, document=calibration.document.model_copy(update=keys))
 
 
 def unaided(campaign):

@@ -11,6 +11,7 @@ from usual import NINE
 
 from accelstudy.approaches import get_approach
 from accelstudy.basics.units import GON, MGON, STANDARD_GRAVITY
+from accelstudy.campaign.calibration.file_format import CalibrationDocument
 from accelstudy.campaign.calibration.sensor_calibration import SensorCalibration
 from accelstudy.data_sheets import DataSheet
 from accelstudy.design.estimability import estimability
@@ -39,7 +40,8 @@ def calibrated(model=NINE, parameters=None, covariance=None):
         found = estimability(get_scheme("mclaren-24"), model, get_approach("gravity"), noise)
         covariance = found.cofactors
     parameters = np.zeros(model.n_parameters) if parameters is None else parameters
-    return SensorCalibration(model, parameters, covariance, STANDARD_GRAVITY, {})
+    document = CalibrationDocument.model_construct(gravity_mps2=STANDARD_GRAVITY)
+    return SensorCalibration(document, model, parameters, covariance)
 
 
 def of(pole, name, tilt, calibration=None, setup=None, sheet=SHEET):

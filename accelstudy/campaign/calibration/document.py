@@ -39,15 +39,11 @@ def calibration_document(assessment: Assessment) -> dict[str, Any]:
         "model": fit.model.name,
         "effects": [effect.spec for effect in fit.model.effects],
         "approach": fit.approach.name,
-        "reference": None
-        if fit.by_reference is None or header.reference is None
-        else header.reference.model_dump(include={"calibration", "frame", "sigma_mps2"}),
-        "type": None
-        if campaign.sensor_type is None
-        else {"file": campaign.sensor_type.file, "sensors": campaign.sensor_type.sensors},
+        "reference": None if fit.by_reference is None else header.reference,
+        "type": campaign.sensor_type,
         "axes": FRD.name,
         "unit": header.unit,
-        "nominal": header.nominal and header.nominal.model_dump(),
+        "nominal": header.nominal,
         "gravity_mps2": fit.gravity,
         "n_positions": campaign.n_positions,
         "sigma_source": "a priori" if fit.trusts_sigma else "a posteriori",
@@ -101,9 +97,7 @@ def calibration_document(assessment: Assessment) -> dict[str, Any]:
 
 def _quality(assessment: Assessment) -> dict[str, Any]:
     """How good a calibration is."""
-    held, test = assessment.held_out, assessment.fit.global_test
-    components = assessment.components
-    gross, tilt = assessment.gross_error, assessment.tilt
+    held, components, tilt = assessment.held_out, assessment.components, assessment.tilt
     angles = None if held is None else held.rms_angles
     parts = {"": tilt.total, "parameters_": tilt.parameters, "reference_": tilt.reference}
     positions = assessment.fit.campaign.positions
@@ -111,18 +105,9 @@ def _quality(assessment: Assessment) -> dict[str, Any]:
         "state": assessment.state,
         "plausible": not assessment.warnings,
         "warnings": assessment.warnings,
-        "gross_error": None if gross is None else {"name": gross.name, "reason": gross.reason},
+        "gross_error": assessment.gross_error,
         "verdict": " ".join(verdict_lines(assessment)),
-        "global_test": None
-        if test is None
-        else {
-            "statistic": test.statistic,
-            "dof": test.dof,
-            "sigma_dof": test.sigma_dof,
-            "p_value": test.p_value,
-            "accepted": test.accepted,
-            "remark": f"{test.lacking}: the test has next to no power" if test.powerless else "",
-        },
+        "global_test": assessment.fit.global_test,
         "suspects": [
             {"position": int(positions[s.position]), "p_value": s.p_value}
             for s in assessment.suspects

@@ -62,6 +62,6 @@ def export(calibration: SensorCalibration, form: str) -> str:
 
 def losses(calibration: SensorCalibration, form: str) -> list[str]:
     """What a form cannot hold of a calibration, a sentence each; and whether data were mended."""
-    mended = calibration.content.get("mended")
-    reasons = [f"the calibration is of mended data: {mended['reason']}"] if mended else []
+    mended = calibration.document.mended
+    reasons = [f"the calibration is of mended data: {mended.reason}"] if mended else []
     return [*reasons, *(px4_losses(calibration) if form == "px4" else [])]

@@ -131,8 +131,10 @@ def level(
     given, forces, hold = read.given, read.forces, _conditions(read, start or 0.0)
     # What the user says of this log is right, whatever was wrong with the campaign.
     option_of = {"unit_error": "unit", "axis_error": "frame"}
-    mended = calibration.content.get("mended") or {"error": "", "matrix": None}
-    mends = mended["matrix"] is not None and option_of.get(mended["error"]) not in given
+    mended = calibration.document.mended
+    mends = mended is not None and mended.matrix is not None
+    if mended is not None and option_of.get(mended.error) in given:
+        mends = False
     if mends:
         forces = forces @ calibration.mending.T
     usable = forces[np.isfinite(forces).all(axis=1)]
@@ -238,7 +240,7 @@ def _level_rows(
         corrected = calibration.correct(forces, hold)
         angles, sigmas = calibration.level(forces, noise, hold)
     lost = np.asarray(~np.isfinite(corrected + angles[:, :1]).all(axis=1))
-    full = calibration.content.get("range_mps2") or np.inf
+    full = calibration.document.range_mps2 or np.inf
     lost |= (np.abs(forces) >= SATURATED_SHARE * full).any(axis=1)
     frame = log.layout.axes
     columns = [f"{axis}_calibrated_mps2" for axis in AXES]
@@ -284,7 +286,7 @@ def _reason(calibration: SensorCalibration, log: Log, row: int) -> str:
     if lost:
         return log.describe(row, lost[0])
     where, _ = log.source.look_up(row, log.places["fx"])
-    full = calibration.content.get("range_mps2")
+    full = calibration.document.range_mps2
     end = "" if full is None else f", or it is at the end of the range, ± {full:.4g} m/s²"
     return f"{where}: the calibration has no force for such a reading{end}"
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Collection, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from functools import cached_property
 from os import PathLike
 from pathlib import Path
@@ -15,6 +15,7 @@ from numpy.typing import ArrayLike, NDArray
 from accelstudy.basics.arguments import check_type, path_of
 from accelstudy.basics.errors import InputError
 from accelstudy.campaign.calibration.file_format import CalibrationDocument
+from accelstudy.campaign.columns import COLUMNS
 from accelstudy.campaign.header import LogLayout
 from accelstudy.effects import HoldConditions, TemperatureCourse
 from accelstudy.effects.hold_conditions import REFERENCE_TEMPERATURE
@@ -30,7 +31,7 @@ RANGE_MARGIN = 0.1
 """Part of the width of a range by which a log may leave it without a warning."""
 FORCES = {"fx_mps2": "forward", "fy_mps2": "right", "fz_mps2": "down"}
 """Ranges of the calibrated forces, and where they point."""
-KNOWN = {"temperature": "temperature_degC", "time": "time_s", "vibration": "vibration_mps2"}
+KNOWN = {name: COLUMNS[name].keys[0] for name in ("temperature", "time", "vibration")}
 """Columns of `HoldConditions` that a device has, and the ranges of a calibration in them."""
 LEVELS = 5
 """Number of values of a condition that matters."""
@@ -42,36 +43,60 @@ class SensorCalibration:
 
     Attributes
     ----------
+    document : CalibrationDocument, all that its file says
     model : SensorModel
     parameters : (u,) array, SI
     covariance : (u, u) array, SI
-    gravity : float, m/s²
-    content : mapping, that of the file, with defaults of what it lacks
-    log : LogLayout, layout of the log from which the campaign was made; None if there was none
-    ranges : mapping, of the calibration, see `calibration_document`
     """
 
+    document: CalibrationDocument
     model: SensorModel
     parameters: Array
     covariance: Array
-    gravity: float
-    content: Mapping[str, Any]
-    log: LogLayout | None = None
-    ranges: Mapping[str, list[float]] = field(default_factory=dict)
+
+    @classmethod
+    def of(cls, document: CalibrationDocument, where: str) -> SensorCalibration:
+        """Take the part of a calibration that belongs to the sensor; errors begin with `where`."""
+        # Effects of the rig were estimated together with those of the sensor, but stay with it.
+        estimated = compose(document.model, tuple(document.effects))
+        model, stays = estimated.without_rig, np.flatnonzero(estimated.stays)
+        covariance = np.array(document.covariance, dtype=float)  # None becomes NaN
+        parameters = np.array([entry.value for entry in document.parameters])[stays]
+        if not model.hold_columns:
+            g = document.gravity_mps2
+            corrected = model.correct(g * np.concatenate([np.eye(3), -np.eye(3)]), parameters, g)
+            if not np.isfinite(corrected).all(1).any():
+                raise InputError(f"{where}: parameters: with these no force explains any reading")
+        return cls(document, model, parameters, covariance[np.ix_(stays, stays)])
+
+    @cached_property
+    def content(self) -> Mapping[str, Any]:
+        """Content of the file, with defaults of what it lacks."""
+        return self.document.model_dump(by_alias=True)
+
+    @property
+    def gravity(self) -> float:
+        """Gravity where it was calibrated, m/s²."""
+        return self.document.gravity_mps2
+
+    @property
+    def ranges(self) -> Mapping[str, list[float]]:
+        """Smallest and largest force, time, temperature and vibration of the calibration."""
+        return self.document.ranges
 
     @property
     def dof(self) -> float:
         """Degrees of freedom of the noise in its sigmas; infinite where it is known."""
-        if self.content["sigma_source"] == "a posteriori":
-            return float(self.content["redundancy"])
-        return float(self.content["sigma_dof"] or np.inf)
+        if self.document.sigma_source == "a posteriori":
+            return self.document.redundancy
+        return self.document.sigma_dof or np.inf
 
     @property
     def usual_layout(self) -> LogLayout:
         """How a log of the sensor is read: as that of the campaign, or in the campaign's unit."""
-        if self.log is not None:
-            return self.log
-        return LogLayout(unit=self.content["unit"], **(self.content["nominal"] or {}))
+        nominal = self.document.nominal
+        of_unit = {} if nominal is None else nominal.model_dump()
+        return self.document.log or LogLayout(unit=self.document.unit, **of_unit)
 
     @cached_property
     def conversion(self) -> Conversion:
@@ -85,8 +110,8 @@ class SensorCalibration:
 
         It differs from I if the data had a gross error that a diagnosis mended.
         """
-        mended = self.content.get("mended") or {}
-        return np.eye(3) if mended.get("matrix") is None else np.array(mended["matrix"], float)
+        mended = self.document.mended
+        return np.eye(3) if mended is None or mended.matrix is None else np.array(mended.matrix)
 
     @property
     def drifts(self) -> tuple[str, ...]:
@@ -100,7 +125,7 @@ class SensorCalibration:
         If that is unknown it is the noise of the mean of a hold, which is smaller; 0 if neither is
         known.
         """
-        sigmas = (self.content.get(f"sigma_{of}_mps2") for of in ("reading", "position"))
+        sigmas = self.document.sigma_reading_mps2, self.document.sigma_position_mps2
         return next((sigma for sigma in sigmas if sigma is not None), 0.0)
 
     def value(self, parameter: str) -> float:
@@ -224,7 +249,7 @@ def read_calibration(path: str | Path) -> SensorCalibration:
     InputError
         If there is no such file, or it is not a calibration.
     """
-    return _of_document(CalibrationDocument.read(path), str(path))
+    return SensorCalibration.of(CalibrationDocument.read(path), str(path))
 
 
 def sensor_of(given: Any, name: str = "calibration") -> SensorCalibration:
@@ -240,29 +265,8 @@ def sensor_of(given: Any, name: str = "calibration") -> SensorCalibration:
 
 def calibration_of(content: Any) -> SensorCalibration:
     """Take the content of `calibration.json`; raise `InputError` if it is something else."""
-    return _of_document(CalibrationDocument.check(content), CalibrationDocument.refusal())
-
-
-def _of_document(document: CalibrationDocument, where: str) -> SensorCalibration:
-    """Take the part of a calibration that belongs to the sensor."""
-    # Effects of the rig were estimated together with those of the sensor, but stay with the rig.
-    estimated = compose(document.model, tuple(document.effects))
-    model, stays = estimated.without_rig, np.flatnonzero(estimated.stays)
-    covariance = np.array(document.covariance, dtype=float)  # None becomes NaN
-    parameters = np.array([entry.value for entry in document.parameters])[stays]
-    if not model.hold_columns:
-        probes = document.gravity_mps2 * np.concatenate([np.eye(3), -np.eye(3)])
-        if not np.isfinite(model.correct(probes, parameters, document.gravity_mps2)).all(1).any():
-            raise InputError(f"{where}: parameters: with these no force explains any reading")
-    return SensorCalibration(
-        model=model,
-        parameters=parameters,
-        covariance=covariance[np.ix_(stays, stays)],
-        gravity=document.gravity_mps2,
-        content=document.model_dump(by_alias=True),
-        log=document.log,
-        ranges=document.ranges,
-    )
+    document = CalibrationDocument.check(content)
+    return SensorCalibration.of(document, CalibrationDocument.refusal())
 
 
 def unknown(model: SensorModel) -> list[tuple[str, str]]:
