@@ -11,6 +11,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+import pandas as pd
 import yaml
 from numpy.typing import NDArray
 
@@ -156,9 +157,7 @@ def write_campaign(campaign: Campaign, folder: str | Path, plausible: bool = Tru
     _parse(columns, header, path, plausible)
     try:
         with whole_file(path) as part, part.open("w", newline="", encoding="utf-8") as file:
-            writer = csv.writer(file, lineterminator="\n")
-            writer.writerow(columns)
-            writer.writerows(zip(*columns.values(), strict=True))
+            pd.DataFrame(columns).to_csv(file, index=False, lineterminator="\n")
         with whole_file(folder / HEADER) as temporary:
             content = header.model_dump(mode="json", exclude_none=True, by_alias=True)
             text = yaml.safe_dump(content, sort_keys=False, allow_unicode=True)
@@ -257,11 +256,11 @@ def _check_together(arrays: Mapping[str, Array], header: Header, path: Path) -> 
 def _columns_in_file(campaign: Campaign) -> dict[str, list[Any]]:
     """Columns of all holds of a campaign, in the units of the file."""
     holds = campaign.holds.reset_index()
-    columns: dict[str, list[Any]] = {}
-    for attribute, column in COLUMNS.items():
-        if column.names[0] in holds:
-            values = holds[[*column.names]].to_numpy()
-            if not column.whole:
+    table: dict[str, list[Any]] = {}
+    for attribute, columns in COLUMNS.items():
+        if columns.names[0] in holds:
+            values = holds[[*columns.names]].to_numpy()
+            if not columns.whole:
                 values = campaign.header.conversion(attribute).from_si(values)
-            columns.update(zip(column.keys, values.T.tolist(), strict=True))
-    return columns
+            table |= zip(columns.keys, values.T.tolist(), strict=True)
+    return table
