@@ -135,5 +135,5 @@ class LinearTheory:
         size = np.linalg.norm(slope, axis=1)
         size[size == 0] = 1.0
         left, values, seen = np.linalg.svd(slope / size[:, None], full_matrices=False)
-        kept = values > np.finfo(float).eps * len(scale) * values[0]
-        return seen[kept], size[:, None] * left[:, kept] * values[kept]
+        significant = values > np.finfo(float).eps * len(scale) * values[0]
+        return seen[significant], size[:, None] * left[:, significant] * values[significant]

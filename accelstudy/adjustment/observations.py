@@ -59,15 +59,15 @@ class Observations:
     def take(self, positions: NDArray[np.int_]) -> Observations:
         """Return the sessions with some of their positions."""
 
-        def chosen(values: ArrayLike) -> ArrayLike:
+        def at_positions(values: ArrayLike) -> ArrayLike:
             return np.asarray(values)[positions] if np.ndim(values) == 2 else values
 
         return replace(
             self,
             forces=self.forces[:, positions],
             angles=None if self.angles is None else self.angles[:, positions],
-            sigma_force=chosen(self.sigma_force),
-            sigma_angle=chosen(self.sigma_angle),
+            sigma_force=at_positions(self.sigma_force),
+            sigma_angle=at_positions(self.sigma_angle),
             common=None if self.common is None else self.common[positions],
             hold=None if self.hold is None else self.hold.take(positions),
         )

@@ -410,18 +410,18 @@ def suspects(
     -------
     tuple of Suspect, in the order of their removal
     """
-    kept = np.arange(observed.forces.shape[1])
+    remaining = np.arange(observed.forces.shape[1])
     removed: list[Suspect] = []
     while len(removed) < most:
-        tests = position_tests(solve(model, approach, observed.take(kept)))
+        tests = position_tests(solve(model, approach, observed.take(remaining)))
         worst = tests.worst(sigma_known)
         if worst is None:
             break
         p_value = float(tests.p_adjusted(sigma_known)[worst])
         if p_value >= alpha:
             break
-        removed.append(Suspect(int(kept[worst]), p_value))
-        kept = np.delete(kept, worst)
+        removed.append(Suspect(int(remaining[worst]), p_value))
+        remaining = np.delete(remaining, worst)
     return tuple(removed)
 
 

@@ -39,13 +39,13 @@ def whole_number(name: str, value: Any, allowed: Range) -> int:
     return int(value)
 
 
-def quantity(name: str, value: Any, given: InputQuantity) -> float:
+def quantity(name: str, value: Any, kind: InputQuantity) -> float:
     """Quantity in SI: a number in SI, or text with a unit, as on the command line."""
     if not isinstance(value, bool) and isinstance(value, Real) and isfinite(value):
-        value = f"{float(value)!r} {given.unit}"  # the unit may begin with a digit, as 1/K does
-    check_type(name, value, str, expected=f"a number in {given.unit} or a text with its unit")
+        value = f"{float(value)!r} {kind.unit}"  # the unit may begin with a digit, as 1/K does
+    check_type(name, value, str, expected=f"a number in {kind.unit} or a text with its unit")
     try:
-        return given.read(value)
+        return kind.read(value)
     except InputError as error:
         raise InputError(f"{name}: {error}") from None
 
@@ -61,10 +61,10 @@ def as_sequence(value: Any) -> Sequence[Any]:
     return tuple(value) if several else (value,)
 
 
-def check_once(given: Sequence[Any], what: str) -> None:
+def check_once(paths: Sequence[Any], what: str) -> None:
     """Raise `InputError` if a path is given twice of which each stands for one thing."""
     seen = set()
-    for path in (one for one in given if isinstance(one, str | PathLike)):
+    for path in (one for one in paths if isinstance(one, str | PathLike)):
         if (place := Path(path).resolve()) in seen:
             raise InputError(f"{path}: is given twice; each {what} counts once")
         seen.add(place)

@@ -67,7 +67,7 @@ def load_files(paths: Iterable[str | Path]) -> None:
 def load_plugins(content: Mapping[str, Any]) -> None:
     """Load the plug-ins that a configuration names; raises errors like `load_files`."""
     try:
-        load_files(_named(content))
+        load_files(_plugin_names(content))
     except InputError as error:
         raise InputError(f"plugins: {error}") from None
 
@@ -85,7 +85,7 @@ def explain_missing(content: Mapping[str, Any], source: str | Path) -> Iterator[
         yield
     except InputError as error:
         loaded = {Path(name).name for name in _files}
-        missing = [name for name in _named(content) if Path(name).name not in loaded]
+        missing = [name for name in _plugin_names(content) if Path(name).name not in loaded]
         if not missing:
             raise
         raise InputError(
@@ -94,7 +94,7 @@ def explain_missing(content: Mapping[str, Any], source: str | Path) -> Iterator[
         ) from None
 
 
-def _named(content: Mapping[str, Any]) -> list[str]:
+def _plugin_names(content: Mapping[str, Any]) -> list[str]:
     """Plug-ins that a file names; what is no text is none, and the schema refuses it."""
     named = content.get("plugins") or ()
     named = [named] if isinstance(named, str) else named

@@ -143,7 +143,7 @@ class WithSettings:
     takes: ClassVar[tuple[Setting, ...]] = ()
 
     @classmethod
-    def chosen(cls, words: dict[str, str], settings: dict[str, float]) -> type[Self]:
+    def variant(cls, words: dict[str, str], settings: dict[str, float]) -> type[Self]:
         """Return the kind that words and settings choose."""
         return cls
 
@@ -226,7 +226,7 @@ class RegistryWithSettings(Registry[ItemWithSettings]):
                     f"{self.kind} {spec!r}: {part!r} is no setting; expected name=number"
                     + ("" if not item.takes else f", such as {item.takes[0].name}=300")
                 ) from None
-        return type(item).chosen(words, settings)(**settings)
+        return type(item).variant(words, settings)(**settings)
 
 
 def import_modules(package: str, path: Iterable[str]) -> None:

@@ -189,18 +189,18 @@ def _converted(value: ArrayLike, unit: str, wanted: str) -> NDArray[np.float64]:
     return _numbers(value) / UNITS.get(unit, {}).get(wanted, 1.0)
 
 
-def to_si(value: ArrayLike, given: str, unit: str) -> NDArray[np.float64]:
-    """Convert `value` from the unit `given` into the SI `unit`.
+def to_si(value: ArrayLike, unit_of_value: str, unit: str) -> NDArray[np.float64]:
+    """Convert `value` from the unit `unit_of_value` into the SI `unit`.
 
     Raises
     ------
     UnknownNameError
-        If `given` is no unit of that quantity.
+        If `unit_of_value` is no unit of that quantity.
     """
     known = UNITS.get(unit, {unit: 1.0})
-    if given not in known:
-        raise UnknownNameError(f"unit of a quantity in {unit}", given, known)
-    return _numbers(value) * known[given]
+    if unit_of_value not in known:
+        raise UnknownNameError(f"unit of a quantity in {unit}", unit_of_value, known)
+    return _numbers(value) * known[unit_of_value]
 
 
 _SPELLINGS = {"µ": "u", "μ": "u", "²": "^2", "°C": "degC", "°": "deg", "√Hz": "sqrt(Hz)"}
@@ -235,15 +235,15 @@ def parse_quantity(
         ends = _ends(least, most)
         like = f", as 2{next(iter(known))}" if unit != "1" else ends and f" of{ends}"
         raise InputError(f"expected {number}{like}, not {brief(text)}")
-    given = match[2] or (unit if bare else next(iter(known)))
+    name = match[2] or (unit if bare else next(iter(known)))
     for spelling, plain in _SPELLINGS.items():
-        given = given.replace(spelling, plain)
-    given = re.sub(r"(?<=[a-zA-Z])2", "^2", given)
-    if given not in known:
+        name = name.replace(spelling, plain)
+    name = re.sub(r"(?<=[a-zA-Z])2", "^2", name)
+    if name not in known:
         raise InputError(f"{brief(text)}: the unit must be one of {', '.join(known)}")
-    value = float(match[1]) * known[given]
+    value = float(match[1]) * known[name]
     if not least <= value <= most:
-        ends = f"{_ends(least / known[given], most / known[given])} {given}".removesuffix(" 1")
+        ends = f"{_ends(least / known[name], most / known[name])} {name}".removesuffix(" 1")
         raise InputError(f"{brief(text)}: must be{ends}")
     if math.isinf(value):
         raise InputError(f"{brief(text)}: must be a finite number")

@@ -83,9 +83,9 @@ def quantity_text(value: float, unit: str) -> str:
     shown, of = float(to_display(value, unit)), display_unit(unit)
     if unit == "rad" and abs(to_attitude(value)) >= 1:
         shown, of = float(to_attitude(value)), attitude_unit()
-    given = f"{shown:.{MAX_ROUND_DIGITS}g}"
-    is_round = "e" not in given and math.isclose(float(given), shown, rel_tol=1e-9)
-    text = given.replace("-", "−") if is_round else number(shown)
+    text = f"{shown:.{MAX_ROUND_DIGITS}g}"
+    is_round = "e" not in text and math.isclose(float(text), shown, rel_tol=1e-9)
+    text = text.replace("-", "−") if is_round else number(shown)
     return f"{text} {of}".removesuffix(" 1")
 
 

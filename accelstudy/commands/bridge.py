@@ -161,18 +161,18 @@ class Command(click.Command):
             kinds.refuse_retired(self.verb, [error.option_name[2:].replace("-", "_")])
             raise
 
-    def _act(self, *, quiet: bool = False, angle_unit: str | None = None, **given: Any) -> None:
+    def _act(self, *, quiet: bool = False, angle_unit: str | None = None, **keywords: Any) -> None:
         with feedback(quiet), angles_in(angle_unit):
-            self.run(**kinds.check(self.verb, given))
+            self.run(**kinds.check(self.verb, keywords))
 
-    def _save(self, *, out: Path | None = None, **given: Any) -> None:
+    def _save(self, *, out: Path | None = None, **keywords: Any) -> None:
         """Write the result to --out, and print what it says."""
-        force = self.writes is not None and given.pop("force")
+        force = self.writes is not None and keywords.pop("force")
         place: AbstractContextManager[Path | None] = nullcontext()
         if out is not None:
-            place = _resolved(self.writes)(out, self._inputs(given), force)
+            place = _resolve(self.writes)(out, self._inputs(keywords), force)
         with place as part:
-            result = _resolved(self.make)(**given)
+            result = _resolve(self.make)(**keywords)
             if status := getattr(result, "exit_status", 0):
                 result.tell(None)
                 raise click.exceptions.Exit(status)
@@ -181,11 +181,11 @@ class Command(click.Command):
         tell = getattr(result, "tell", None)
         tell(out) if tell else tell_value(result)
 
-    def _inputs(self, given: Mapping[str, Any]) -> list[Path]:
+    def _inputs(self, keywords: Mapping[str, Any]) -> list[Path]:
         """Files and folders that are read, of patterns, too."""
         files = {name for name, one in kinds.keywords(self.verb).items() if one.kind.files}
         files |= {one.name for one in self.arguments}
-        values = (one for name in files for one in as_sequence(given[name]) if one is not None)
+        values = (one for name in files for one in as_sequence(keywords[name]) if one is not None)
         paths = [Path(value) for value in values if isinstance(value, str | Path)]
         found = (matches(path, os.path.exists) or [] for path in paths)
         return [*paths, *(Path(one) for several in found for one in several)]
@@ -204,7 +204,7 @@ class Command(click.Command):
                     formatter.write_dl(records)
 
 
-def _resolved(place: Any) -> Any:
+def _resolve(place: Any) -> Any:
     """What stands at a place, if it is one as "module:name"."""
     return resolve_name(place) if isinstance(place, str) else place
 

@@ -21,7 +21,7 @@ from accelstudy.verbs.kinds import PATH
 
 
 def simulate_campaign(
-    out: Path, truth: Path | None, force: bool, name: str | None, **given: Any
+    out: Path, truth: Path | None, force: bool, name: str | None, **keywords: Any
 ) -> None:
     """Write a simulated campaign and, apart from it, the truth."""
     from accelstudy.campaign.format import write_campaign
@@ -32,7 +32,7 @@ def simulate_campaign(
         nullcontext() if truth is None else new_file(truth, force=force) as truth_file,
         outputs.CAMPAIGN.place(out, force=force) as folder,
     ):
-        campaign = campaigns.simulate_campaign(name=name or out.resolve().name, **given)
+        campaign = campaigns.simulate_campaign(name=name or out.resolve().name, **keywords)
         write_campaign(campaign, folder)
         if truth_file is not None:
             write_truth(campaign, truth_file)
@@ -95,7 +95,7 @@ SECTIONS = {
         Command(calibrations.check_sigmas),
         Command(
             calibrations.apply,
-            make=calibrations.leveled,
+            make=calibrations.level_log,
             writes=new_table,
             out="CSV or Parquet file to write.",
         ),

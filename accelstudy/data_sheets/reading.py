@@ -87,13 +87,13 @@ def parse_data_sheet(content: Mapping[str, Any], source: str = "data sheet") -> 
     values: dict[str, float] = {}
     sources: dict[str, str] = {}
     try:
-        for key, given in content.items():
+        for key, entry in content.items():
             if key in TYPE_KEYS:
                 continue
             if key not in keys:
                 raise UnknownNameError("key", key, keys)
             if key not in TEXTS:
-                values[key], sources[key] = _quantity(key, given)
+                values[key], sources[key] = _quantity(key, entry)
         texts = {key: str(content[key]) for key in TEXTS if content.get(key) is not None}
         if DENSITY in values:
             if "velocity_random_walk" in values:
@@ -109,16 +109,16 @@ def parse_data_sheet(content: Mapping[str, Any], source: str = "data sheet") -> 
         raise InputError(f"{source}: {error}") from None
 
 
-def _quantity(key: str, given: Any) -> tuple[float, str]:
+def _quantity(key: str, entry: Any) -> tuple[float, str]:
     """Value and source of a quantity, in SI."""
     unit = QUANTITIES["velocity_random_walk" if key == DENSITY else key][0]
-    text, where = given, ""
-    if isinstance(given, Mapping):
-        if extra := set(given) - {"value", "source"}:
+    text, where = entry, ""
+    if isinstance(entry, Mapping):
+        if extra := set(entry) - {"value", "source"}:
             raise UnknownNameError(f"key of {key}", min(map(str, extra)), ("value", "source"))
-        if "value" not in given:
+        if "value" not in entry:
             raise InputError(f"{key}: value: missing")
-        text, where = given["value"], str(given.get("source") or "")
+        text, where = entry["value"], str(entry.get("source") or "")
     if not isinstance(text, str | int | float) or isinstance(text, bool):
         raise InputError(f"{key}: must be a number with its unit, not {brief(text)}")
     try:

@@ -74,8 +74,8 @@ def _drift_shown(task: Task, directions: Array) -> Array:
     effects = [effect.name for effect in task.model.effects for _ in effect.parameters]
     biases = np.flatnonzero(np.array(effects) == "bias")
     drifts = np.linspace(-1.0, 1.0, n)[:, None, None] * rows[..., biases]
-    whole = np.concatenate([rows, drifts], axis=-1).reshape(k, -1, u + len(biases))
-    whole = whole / np.linalg.norm(whole, axis=1, keepdims=True)
+    extended = np.concatenate([rows, drifts], axis=-1).reshape(k, -1, u + len(biases))
+    extended = extended / np.linalg.norm(extended, axis=1, keepdims=True)
     # The last block of R is what orthogonalisation to the parameters leaves of the drift.
-    left = np.linalg.qr(whole).R[:, u:, u:]
+    left = np.linalg.qr(extended).R[:, u:, u:]
     return np.asarray(np.sum(left**2, axis=1).min(axis=1, initial=1.0))

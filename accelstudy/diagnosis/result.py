@@ -223,7 +223,7 @@ class CampaignDiagnosis:
         named = [NamedCause(name, name, at, (name,), None) for name, at in gross]
         if self.finding.verdict == "noise_model":
             return (*named, self._noise())
-        return (*named, *self._chosen())
+        return (*named, *self._chosen_causes())
 
     @property
     def effects(self) -> tuple[NamedCause, ...]:
@@ -250,7 +250,7 @@ class CampaignDiagnosis:
             name = worst.name
         return NamedCause(name, name, None, (name,), posterior.p_noise)
 
-    def _chosen(self) -> list[NamedCause]:
+    def _chosen_causes(self) -> list[NamedCause]:
         """What was chosen, with its estimates."""
         solution, chosen = self.final.solution, self.finding.chosen
         cofactors = with_settings(self.frame, solution, [one.shape for one in chosen])
@@ -258,9 +258,9 @@ class CampaignDiagnosis:
         each = zip(solution.parameters.tolist(), sigma, strict=False)
         values = dict(zip(solution.model.parameter_names, each, strict=False))
         searched = iter(sigma[len(solution.parameters) :])
-        return [self._named(cause, values, searched) for cause in chosen]
+        return [self._describe(cause, values, searched) for cause in chosen]
 
-    def _named(
+    def _describe(
         self, cause: Cause, values: dict[str, tuple[float, float]], searched: Iterator[float]
     ) -> NamedCause:
         """Describe a cause by the values of all parameters, and sigmas of the log settings."""
@@ -366,8 +366,8 @@ class CampaignDiagnosis:
         finding = self.finding
         if finding.verdict not in MISSING:
             return ()
-        told = finding.credible_set if finding.verdict in ("unknown", LEARNED) else ()
-        names = next((one.names for one in told if UNKNOWN in one.names), (UNKNOWN,))
+        explanations = finding.credible_set if finding.verdict in ("unknown", LEARNED) else ()
+        names = next((one.names for one in explanations if UNKNOWN in one.names), (UNKNOWN,))
         like = [LikeShape(*at, p) for at, p in shares_of_places(self.problem, names).items()]
         return tuple(sorted(like, key=lambda one: -one.posterior))
 

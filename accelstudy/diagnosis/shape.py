@@ -14,7 +14,7 @@ from accelstudy.diagnosis.decision.functions import coordinate_values
 from accelstudy.diagnosis.decision.verdict import Finding
 from accelstudy.diagnosis.rules import RULES
 from accelstudy.effects import learned
-from accelstudy.effects.learned import OF_EACH, WAVES, Learned
+from accelstudy.effects.learned import OF_EACH, WAVES, LearnedFunction
 
 Array = NDArray[np.float64]
 
@@ -113,7 +113,7 @@ class LearnedShape:
     Attributes
     ----------
     coordinate, target : str
-    effect : Learned
+    effect : LearnedFunction
     subject : str, what depends on what: "the bias of x and y depends on the yaw"
     components : tuple of str, c components that have a function
     axes : tuple of str, those in which it shows
@@ -123,7 +123,7 @@ class LearnedShape:
 
     coordinate: str
     target: str
-    effect: Learned
+    effect: LearnedFunction
     subject: str
     components: tuple[str, ...]
     axes: tuple[str, ...]
@@ -149,7 +149,7 @@ def shape_of(finding: Finding, variance: float) -> LearnedShape | None:
     if finding.place is None:
         return None
     effect, frame, solution = finding.chosen[0].shape.effect, finding.frame, finding.frame.solution
-    assert isinstance(effect, Learned)
+    assert isinstance(effect, LearnedFunction)
     at = coordinate_values(effect, frame)
     if effect.coordinate not in (*OF_EACH, "angle"):
         at = at[:, :1]

@@ -85,10 +85,10 @@ def upper_limits(frame: SessionFit, known: bool, named: Sequence[str]) -> list[U
     for name, shapes in frame.candidates.items():
         if name == OUTLIER or name in named:
             continue
-        whole = whole_shapes(shapes.hypotheses)
-        if not whole:
+        searched = whole_shapes(shapes.hypotheses)
+        if not searched:
             continue
-        best = max(whole, key=lambda h: float(np.sum((frame.residuals.z @ h.basis) ** 2)))
+        best = max(searched, key=lambda h: float(np.sum((frame.residuals.z @ h.basis) ** 2)))
         columns = signature_columns(frame, best)
         inverse = np.linalg.pinv(columns)
         residuals = frame.residuals

@@ -39,14 +39,14 @@ def save(figure: Figure, path: str | Path, title: str, dpi: int) -> None:
     title : str, for the metadata
     dpi : int, of a PNG
     """
-    with mpl.rc_context(STYLE), whole_file(path) as whole:  # type: ignore[arg-type]
+    with mpl.rc_context(STYLE), whole_file(path) as part:  # type: ignore[arg-type]
         if Path(path).suffix == ".svg":
             metadata = {"Date": None, "Creator": None, "Title": title}
-            FigureCanvasSVG(figure).print_svg(whole, metadata=metadata)  # type: ignore[no-untyped-call]
+            FigureCanvasSVG(figure).print_svg(part, metadata=metadata)  # type: ignore[no-untyped-call]
         else:
             figure.set_dpi(dpi)
             FigureCanvasAgg(figure).print_png(  # type: ignore[no-untyped-call]
-                whole,
+                part,
                 metadata={"Software": None, "Title": title},
                 pil_kwargs={"compress_level": COMPRESSION},
             )

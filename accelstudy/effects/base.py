@@ -144,8 +144,8 @@ class Effect(WithSettings):
     @property
     def spec(self) -> str:
         """Name with its settings and, if some parameters are left out, with those that it has."""
-        kept = f"[{', '.join(p.name for p in self.parameters)}]" if self.partial else ""
-        return super().spec + kept
+        names = f"[{', '.join(p.name for p in self.parameters)}]" if self.partial else ""
+        return super().spec + names
 
     def candidates(
         self, hold: HoldConditions, f: NDArray[np.float64], g: float
@@ -161,9 +161,9 @@ class Effect(WithSettings):
         """Shapes between two candidates, which were skipped because there are many positions."""
         return ()
 
-    def with_parameters(self, kept: tuple[int, ...]) -> Effect:
+    def with_parameters(self, indices: tuple[int, ...]) -> Effect:
         """Return the effect with some of its parameters; the others are zero."""
-        return _part(type(self), kept)(**self.settings)  # type: ignore[arg-type]
+        return _part(type(self), indices)(**self.settings)  # type: ignore[arg-type]
 
     def axes(self, p: tuple[Number, ...], xp: Any) -> Matrix:
         """Add to the matrix T of the sensitive axes."""
@@ -181,19 +181,19 @@ class Effect(WithSettings):
 
 
 @cache
-def _part(kind: type[Effect], kept: tuple[int, ...]) -> type[Effect]:
+def _part(kind: type[Effect], indices: tuple[int, ...]) -> type[Effect]:
     """Kind of effect with some of its parameters."""
-    if kept == tuple(range(len(kind.parameters))):
+    if indices == tuple(range(len(kind.parameters))):
         return kind
 
     def full(p: tuple[Number, ...]) -> tuple[Number, ...]:
-        values = dict(zip(kept, p, strict=True))
+        values = dict(zip(indices, p, strict=True))
         return tuple(values.get(i, 0) for i in range(len(kind.parameters)))
 
     content = {
         "__doc__": kind.__doc__,
         "partial": True,
-        "parameters": tuple(kind.parameters[i] for i in kept),
+        "parameters": tuple(kind.parameters[i] for i in indices),
         "axes": lambda self, p, xp: kind.axes(self, full(p), xp),
         "output": lambda self, f, p, g, hold, xp: kind.output(self, f, full(p), g, hold, xp),
         "reading": lambda self, angles, p, hold, xp: kind.reading(self, angles, full(p), hold, xp),

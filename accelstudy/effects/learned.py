@@ -54,7 +54,7 @@ OF_EACH = ("force", "previous")
 """Coordinates of which each axis has its own."""
 
 
-class Learned(Effect):
+class LearnedFunction(Effect):
     """Smooth function h of a coordinate, with zero mean over its range; constant beyond it.
 
     It is a Gaussian process, h(c) = Σ_j w_j φ_j(c), w_j ~ N(0, σ² S_j); see
@@ -77,7 +77,7 @@ class Learned(Effect):
             raise InputError(f"effect 'learned': low={low:g} must be below high={high:g}")
 
     @classmethod
-    def chosen(cls, words: dict[str, str], settings: dict[str, float]) -> type[Learned]:
+    def variant(cls, words: dict[str, str], settings: dict[str, float]) -> type[LearnedFunction]:
         """Return the kind with some coordinate and target, and as many functions as it needs."""
         coordinate = words.get("coordinate", cls.coordinate)
         target = words.get("target", cls.target)
@@ -223,7 +223,7 @@ def _needed(coordinate: str, length: float) -> tuple[int, float]:
 
 
 @cache
-def learned_kind(coordinate: str, target: str, count: int, edge: float) -> type[Learned]:
+def learned_kind(coordinate: str, target: str, count: int, edge: float) -> type[LearnedFunction]:
     """Kind of a coordinate, a target, and a number of functions, which vanish at an edge.
 
     Raises
@@ -232,16 +232,16 @@ def learned_kind(coordinate: str, target: str, count: int, edge: float) -> type[
         If nothing of the kind can be.
     """
     known = (*UNITS, *ANGLES, *WAVES)
-    for word, given, words in (("coordinate", coordinate, known), ("target", target, TARGETS)):
-        if given not in words:
-            raise InputError(f"effect 'learned': {word}={given} is none of {', '.join(words)}")
+    for word, name, words in (("coordinate", coordinate, known), ("target", target, TARGETS)):
+        if name not in words:
+            raise InputError(f"effect 'learned': {word}={name} is none of {', '.join(words)}")
     of_axes, of_robot = coordinate in OF_EACH, target in ("reading", "tilt")
     if (coordinate == "angle" and target != "reading") or (of_axes and of_robot):
         raise InputError(f"effect 'learned': no {target} can depend on the {coordinate}")
     components, unit = TARGETS[target]
     size = 2 * count if coordinate in (*ANGLES, *WAVES) else count
     content = {
-        "__doc__": Learned.__doc__,
+        "__doc__": LearnedFunction.__doc__,
         "coordinate": coordinate,
         "target": target,
         "count": count,
@@ -254,7 +254,7 @@ def learned_kind(coordinate: str, target: str, count: int, edge: float) -> type[
             for j in range(1, size + 1)
         ),
     }
-    return type("Learned", (Learned,), content)
+    return type("LearnedFunction", (LearnedFunction,), content)
 
 
 def _takes(coordinate: str, unit: str) -> tuple[Setting, ...]:
@@ -270,4 +270,10 @@ def _takes(coordinate: str, unit: str) -> tuple[Setting, ...]:
     return (Setting("low", of, -1.0), Setting("high", of, 1.0), *lag, length, amplitude)
 
 
-unlisted(learned_kind(Learned.coordinate, Learned.target, *_needed(Learned.coordinate, LENGTH)))
+unlisted(
+    learned_kind(
+        LearnedFunction.coordinate,
+        LearnedFunction.target,
+        *_needed(LearnedFunction.coordinate, LENGTH),
+    )
+)

@@ -68,7 +68,7 @@ class OutputKind:
             written. `out` is then unchanged.
         """
         out = Path(out)
-        with _reported(out):
+        with _disk_errors_named(out):
             _check_apart(out, inputs)
             is_earlier_result = _check_folder(out, self, force)
             with _staging(out, out, "new") as new:
@@ -137,7 +137,7 @@ def new_file(
         given, or cannot be written.
     """
     path = Path(path)
-    with _reported(path):
+    with _disk_errors_named(path):
         _check_apart(path, inputs)
         if path.is_dir() or (path.exists() and not path.is_file()):
             raise InputError(f"{path}: is no file; give the name of a file to write")
@@ -213,7 +213,7 @@ def _staging(near: Path, out: Path, name: str) -> Iterator[Path]:
 
 
 @contextmanager
-def _reported(out: Path) -> Iterator[None]:
+def _disk_errors_named(out: Path) -> Iterator[None]:
     """Turn errors of the disk into one line that names `out`."""
     try:
         yield

@@ -104,8 +104,8 @@ def table_writer(
     counting = [f.name for f in schema if pa.types.is_int64(f.type)]
     floats = [f.name for f in schema if pa.types.is_floating(f.type)]
     if provenance is not None:
-        made = {METADATA_KEY: json.dumps(origin(provenance))}
-        schema = schema.with_metadata({**(schema.metadata or {}), **made})
+        metadata = {METADATA_KEY: json.dumps(origin(provenance))}
+        schema = schema.with_metadata({**(schema.metadata or {}), **metadata})
     with (
         whole_file(path) as temporary,
         pq.ParquetWriter(

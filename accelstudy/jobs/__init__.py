@@ -30,7 +30,7 @@ _NOT_OURS = {
 """Errors of the operating system, and what a person can do about them."""
 
 
-def code_version(*beside: str | Path, without: Collection[str] = ()) -> str:
+def code_version(*folders: str | Path, without: Collection[str] = ()) -> str:
     """Return the version of this package, and digests of its code and of the plug-ins there are.
 
     Snakemake notices that a script has changed, but not that a package has. With this as a
@@ -38,11 +38,11 @@ def code_version(*beside: str | Path, without: Collection[str] = ()) -> str:
 
     Parameters
     ----------
-    beside : folders whose code counts, too
-    without : folders of this package whose code does not
+    folders : whose code counts, too
+    without : names of folders of this package whose code does not
     """
     own = Path(__file__).parents[1]
-    code = code_digest(own, *map(Path, beside), without=[own / folder for folder in without])
+    code = code_digest(own, *map(Path, folders), without=[own / folder for folder in without])
     return " ".join([__version__, code, *digests().values()])
 
 

@@ -39,7 +39,7 @@ class Kernel:
     def __init__(self, equations: CalibrationEquations) -> None:
         self.function = KernelFunction(equations)
         self._below = np.tril_indices(self.function.u, -1)
-        self._compiled = Compiled(text_of(self.function), NAME, len(INTEGERS), len(POINTERS))
+        self._compiled = CompiledCode(text_of(self.function), NAME, len(INTEGERS), len(POINTERS))
 
     def calibrate(self, problem: CalibrationProblem) -> Block:
         """Calibrate the sessions of a problem; result and errors as of `calibrate`."""
@@ -113,7 +113,7 @@ def _aligned(count: int) -> Array:
 # From LLVM's text to a function ------------------------------------------------------------------
 
 
-class Compiled:
+class CompiledCode:
     """A compiled function.
 
     Parameters

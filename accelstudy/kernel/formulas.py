@@ -42,26 +42,26 @@ class Formulas:
             if expression.free_symbols <= same | self._expanded.keys():
                 self._expanded[symbol] = expression.xreplace(self._expanded)
             else:
-                self._shared.append((symbol, self._named(expression)))
-        self._results = [self._named(expression) for expression in self._results]
+                self._shared.append((symbol, self._with_symbols(expression)))
+        self._results = [self._with_symbols(expression) for expression in self._results]
 
-    def _named(self, expression: Any) -> Any:
+    def _with_symbols(self, expression: Any) -> Any:
         """Replace the largest parts that are the same in all replicates by symbols."""
         if expression.is_number:
             return expression
         if expression.free_symbols <= self._same | self._expanded.keys():
-            whole = expression.xreplace(self._expanded)
-            if whole.is_Symbol:
-                self.known[whole] = whole
-                return whole
+            expanded = expression.xreplace(self._expanded)
+            if expanded.is_Symbol:
+                self.known[expanded] = expanded
+                return expanded
             names = {value: symbol for symbol, value in self.known.items()}
             # By number: the place of a SymPy dummy in a sum depends on what was traced before.
-            symbol = names.get(whole) or sp.Symbol(f"known_{len(self.known):03}", real=True)
-            self.known[symbol] = whole
+            symbol = names.get(expanded) or sp.Symbol(f"known_{len(self.known):03}", real=True)
+            self.known[symbol] = expanded
             return symbol
         if expression.is_Symbol:
             return expression
-        return expression.func(*(self._named(part) for part in expression.args))
+        return expression.func(*(self._with_symbols(part) for part in expression.args))
 
     def write(self, code: Code, table: Mapping[sp.Symbol, Term]) -> list[Term]:
         """Write the expressions at values of all symbols, those of `known` included."""

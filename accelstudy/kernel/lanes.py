@@ -155,11 +155,11 @@ class Code:
         return self._together(values)
 
     def _call(self, name: str, kind: Any, arguments: Any) -> Any:
-        given = [*arguments]
+        values = [*arguments]
         function = self._module.globals.get(name) or ir.Function(
-            self._module, ir.FunctionType(kind, [kind] * len(given)), name
+            self._module, ir.FunctionType(kind, [kind] * len(values)), name
         )
-        return self.builder.call(function, given)
+        return self.builder.call(function, values)
 
     def _together(self, values: Sequence[Any]) -> Lanes:
         """Numbers of the lanes as one; a single one is that of all."""

@@ -38,7 +38,7 @@ from accelstudy.kernel.lanes import (
 )
 from accelstudy.kernel.lanes import sqrt as root
 from accelstudy.symbolic.algebra import sp
-from accelstudy.symbolic.formula_cache import kept_under
+from accelstudy.symbolic.formula_cache import cached_by_key
 from accelstudy.symbolic.tracing import Traced, symbols, traced
 
 NAME = "calibrate"
@@ -136,7 +136,7 @@ Rows: TypeAlias = list[list[Term]]
 
 def text_of(function: KernelFunction) -> str:
     """Write the function as LLVM's text, which is kept."""
-    return kept_under(function.key, "kernel", lambda: _Writer(function).code.text())
+    return cached_by_key(function.key, "kernel", lambda: _Writer(function).code.text())
 
 
 class _Writer:

@@ -75,16 +75,16 @@ def leveling_shares(
         not linear within the errors, the effects are NaN and `defined` False.
     """
     names = [*FORCES, *model.parameter_names]
-    whole = np.zeros((len(names), len(names)))
-    whole[:3, :3] = sigma_force**2 * np.eye(3)
-    whole[3:, 3:] = covariance
-    sigma = np.sqrt(np.diagonal(whole))
+    covariances = np.zeros((len(names), len(names)))
+    covariances[:3, :3] = sigma_force**2 * np.eye(3)
+    covariances[3:, 3:] = covariance
+    sigma = np.sqrt(np.diagonal(covariances))
     attitudes = np.array(list(product(roll_gon, pitch_gon))) * GON
     f_b = np.stack(specific_force(attitudes[:, 0], attitudes[:, 1], g), axis=-1)
     f_s = model.sense(f_b, parameters, g)
     at = model, parameters, f_s, f_b, g
     slopes = np.concatenate([tilt_by_output(*at), tilt_slope(*at)], axis=-1)
-    shares, variance = linear_shapley(slopes.reshape(-1, len(names)), whole)
+    shares, variance = linear_shapley(slopes.reshape(-1, len(names)), covariances)
     shares, variance = shares.reshape(slopes.shape), variance.reshape(slopes.shape[:2])
     total = (slopes * sigma) ** 2
     total /= np.maximum(total.sum(axis=-1, keepdims=True), np.finfo(float).tiny)

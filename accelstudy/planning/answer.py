@@ -42,35 +42,35 @@ MAX_TRIES = 12
 """Candidates of one kind that are simulated until one reaches the target."""
 
 
-def plan_for(**given: Any) -> Plan:
+def plan_for(**keywords: Any) -> Plan:
     """Plan by the keywords of `accelstudy.plan`, checked."""
-    sensor, sigma, max_time = given["sensor"], given["sigma"], given["max_time"]
-    by_hand = Equipment("gravity", given["moving_time"], 0.0)
-    robot = Equipment("robot", given["robot_moving_time"], given["robot_setup_time"])
+    sensor, sigma, max_time = keywords["sensor"], keywords["sigma"], keywords["max_time"]
+    by_hand = Equipment("gravity", keywords["moving_time"], 0.0)
+    robot = Equipment("robot", keywords["robot_moving_time"], keywords["robot_setup_time"])
     equipment = {"gravity": (by_hand,), "robot": (robot,), "both": (by_hand, robot)}
-    if given["equipment"] not in equipment:
-        raise UnknownNameError("equipment", given["equipment"], equipment)
+    if keywords["equipment"] not in equipment:
+        raise UnknownNameError("equipment", keywords["equipment"], equipment)
     if (sensor is None) == (sigma is None):
         both = ", not both" if sensor else ""
         raise InputError(f"plan: give the sensor by `sensor`, or its noise by `sigma`{both}")
     sheet = get_data_sheet(sensor) if sigma is None else sheet_of_sigma(sigma)
-    if given["history"] is not None:
+    if keywords["history"] is not None:
         from accelstudy.data_sheets.measured import with_history  # slow to import
 
-        sheet = with_history(sheet, given["history"])
+        sheet = with_history(sheet, keywords["history"])
     asked = Question(
-        given["tilt_accuracy"],
-        given["tilt_range"],
+        keywords["tilt_accuracy"],
+        keywords["tilt_range"],
         sheet,
-        equipment[given["equipment"]],
-        given["robot_sigma"],
-        given["max_positions"],
-        given["confidence"],
-        tuple(sorted({*given["holds"]})),
+        equipment[keywords["equipment"]],
+        keywords["robot_sigma"],
+        keywords["max_positions"],
+        keywords["confidence"],
+        tuple(sorted({*keywords["holds"]})),
         math.inf if max_time is None else max_time,
     )
     begin("comparing calibrations, which takes some seconds ...")
-    return answer(asked, given["seed"], given["replicates"])
+    return answer(asked, keywords["seed"], keywords["replicates"])
 
 
 def answer(question: Question, seed: int = 1, replicates: int = 200) -> Plan:

@@ -67,13 +67,13 @@ class Design(Result):
         self.asked, self.name = asked, f"{len(directions)} positions"
 
     @classmethod
-    def of(cls, *, positions: int, starts: int, **given: Any) -> Design:
+    def of(cls, *, positions: int, starts: int, **keywords: Any) -> Design:
         """Search by the keywords of `accelstudy.find_positions`, and order what is found."""
         with stage("search"):
-            search = search_for(**given)
+            search = search_for(**keywords)
             found = search.optimum(positions, starts)
             order = field_order(search.task, found)
-        asked = {"attitudes": given["attitudes"], "after": given["after"], "starts": starts}
+        asked = {"attitudes": keywords["attitudes"], "after": keywords["after"], "starts": starts}
         return cls(search, found[order], asked)
 
     @property
@@ -234,7 +234,7 @@ def _both(rms: Any) -> str:
 
 
 def write_scheme(
-    path: Path, name: str, title: str, source: str, directions: Array, made: Mapping[str, Any]
+    path: Path, name: str, title: str, source: str, directions: Array, provenance: Mapping[str, Any]
 ) -> None:
     """Write a scheme that `accelstudy.schemes.get_scheme` reads.
 
@@ -243,14 +243,14 @@ def write_scheme(
     path : Path
     name, title, source : str, of the scheme
     directions : (n, 3) array of unit vectors
-    made : mapping, plain data: how it was made, and how good it is
+    provenance : mapping, plain data: how it was made, and how good it is
     """
     angles = (units.to_recorded(angles_to(directions), "rad") / 1000).round(3) + 0.0
     content = {
         "scheme": name,
         "title": title,
         "source": source,
-        "design": dict(made),
+        "design": dict(provenance),
         "positions": [
             {"position": i, "roll_gon": roll, "pitch_gon": pitch}
             for i, (roll, pitch) in enumerate(angles.tolist(), 1)

@@ -194,8 +194,8 @@ class Plan(Result):
         directions = first.scheme.directions
         if first.search is not None:
             directions = directions[field_order(first.search.task, directions)]
-        made = f"accelstudy plan, seed {self.seed}", directions, {"made_by": "accelstudy plan"}
-        write_scheme(folder / "positions.yaml", "plan", "of plan", *made)
+        origin = f"accelstudy plan, seed {self.seed}", directions, {"made_by": "accelstudy plan"}
+        write_scheme(folder / "positions.yaml", "plan", "of plan", *origin)
         with mpl.rc_context(STYLE):  # type: ignore[arg-type]
             figure = new_figure(*self.size)
             self.draw(figure.subplots())

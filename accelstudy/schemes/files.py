@@ -88,14 +88,14 @@ def parse_scheme(content: Mapping[str, Any], name: str) -> Scheme:
     )
 
 
-def _directions(given: Any) -> np.ndarray[Any, np.dtype[np.float64]]:
+def _directions(entry: Any) -> np.ndarray[Any, np.dtype[np.float64]]:
     wrong = "directions: must be a list of rows of three numbers, gravity in the body frame"
-    if not isinstance(given, Sequence) or isinstance(given, str) or not given:
+    if not isinstance(entry, Sequence) or isinstance(entry, str) or not entry:
         raise InputError(wrong)
-    for number, row in enumerate(given, start=1):
+    for number, row in enumerate(entry, start=1):
         numbers = isinstance(row, Sequence) and all(
             isinstance(x, int | float) and not isinstance(x, bool) and abs(x) < 1e100 for x in row
         )
         if not numbers or len(row) != 3 or not np.linalg.norm(row) > 0:
             raise InputError(f"{wrong}; row {number} is not")
-    return np.asarray(given, dtype=float)
+    return np.asarray(entry, dtype=float)

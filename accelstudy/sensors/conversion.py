@@ -81,7 +81,7 @@ def conversion_of(
 
 
 def _triple(value: ArrayLike, name: str) -> Array:
-    given = np.atleast_1d(np.asarray(value, dtype=float))
-    if given.shape not in ((1,), (3,)):
-        raise InputError(f"{name}: one number or three, not {given.size}")
-    return np.array(np.broadcast_to(given, 3))
+    values = np.atleast_1d(np.asarray(value, dtype=float))
+    if values.shape not in ((1,), (3,)):
+        raise InputError(f"{name}: one number or three, not {values.size}")
+    return np.array(np.broadcast_to(values, 3))

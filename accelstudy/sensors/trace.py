@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from accelstudy.effects import Effect, HoldConditions
 from accelstudy.effects.hold_symbols import HoldSymbols
 from accelstudy.symbolic.algebra import sp
-from accelstudy.symbolic.formula_cache import kept_under, key_of
+from accelstudy.symbolic.formula_cache import cached_by_key, key_of
 from accelstudy.symbolic.tracing import (
     Traced,
     TracedFunction,
@@ -148,16 +148,16 @@ class SensorTrace:
     @cached_property
     def conditions(self) -> frozenset[str]:
         """Names of columns of holds, and of temperatures behind lags, that occur."""
-        return frozenset(kept_under(self.key, "conditions", lambda: self.formulas.conditions))
+        return frozenset(cached_by_key(self.key, "conditions", lambda: self.formulas.conditions))
 
     @cached_property
     def affine(self) -> bool:
         """Whether the output is linear in the force, and depends on nothing but it."""
-        return kept_under(self.key, "affine", lambda: self.formulas.affine)
+        return cached_by_key(self.key, "affine", lambda: self.formulas.affine)
 
     @cached_property
     def _lags(self) -> list[tuple[int, str]]:
-        return kept_under(self.key, "lags", lambda: self.formulas.lags)
+        return cached_by_key(self.key, "lags", lambda: self.formulas.lags)
 
     def lags(self, settings: NDArray[np.float64]) -> list[tuple[float, str]]:
         """Lags of temperatures, of settings (s,), with the names of the temperatures."""

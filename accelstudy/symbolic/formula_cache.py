@@ -44,7 +44,7 @@ def key_of(*parts: Callable[..., Any] | str) -> str | None:
     return hashlib.sha256("\n".join((*_versions(), *map(str, described))).encode()).hexdigest()
 
 
-def kept_under(key: str | None, name: str, make: Callable[[], Made]) -> Made:
+def cached_by_key(key: str | None, name: str, make: Callable[[], Made]) -> Made:
     """Return what `make` makes, or what it made before of the same key.
 
     It is made of tuples, numbers, texts and code objects.
@@ -52,8 +52,8 @@ def kept_under(key: str | None, name: str, make: Callable[[], Made]) -> Made:
     if key is None:
         return make()
     dumped = lambda: marshal.dumps(make())  # type: ignore[arg-type]  # noqa: E731
-    made: Made = cached(KIND, f"{key}-{name}", dumped, marshal.loads)
-    return made
+    module: Made = cached(KIND, f"{key}-{name}", dumped, marshal.loads)
+    return module
 
 
 def _described(part: Callable[..., Any] | str) -> str | None:

@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from accelstudy.symbolic.algebra import sp
-from accelstudy.symbolic.formula_cache import kept_under, key_of
+from accelstudy.symbolic.formula_cache import cached_by_key, key_of
 
 
 class _Symbolic:
@@ -123,7 +123,7 @@ class TracedFunction:
 
     @cached_property
     def _generated(self) -> tuple[tuple[int, int], list[tuple[int, int]], list[str], CodeType]:
-        return kept_under(self._key, self._name, self._generate)
+        return cached_by_key(self._key, self._name, self._generate)
 
     @cached_property
     def _function(self) -> Callable[..., list[Any]]:

@@ -169,20 +169,21 @@ def apply(
     --------
         accelstudy apply calibrated/calibration.json calibration.csv --out leveled.csv
     """
-    given: dict[str, Any] = {**locals()}
-    result = leveled(**given)
+    keywords: dict[str, Any] = {**locals()}
+    result = level_log(**keywords)
     table = result.to_frame()
     table.attrs["warnings"] = list(result.warnings)
     return table
 
 
-def leveled(calibration: Any, log: Any, **given: Any) -> LeveledLog:
+def level_log(calibration: Any, log: Any, **keywords: Any) -> LeveledLog:
     """Level a log by the keywords of `apply`, checked."""
     from accelstudy.campaign.calibration.leveling import level
     from accelstudy.campaign.calibration.sensor_calibration import sensor_of
     from accelstudy.campaign.importing.settings import layout_of
 
-    return level(sensor_of(calibration), log, layout_of(given), given["sigma"], given["start"])
+    sigma, start = keywords["sigma"], keywords["start"]
+    return level(sensor_of(calibration), log, layout_of(keywords), sigma, start)
 
 
 @verb
@@ -260,7 +261,7 @@ def diagnose(
     from accelstudy.verbs.inputs import campaign_path, resolve
 
     # The diagnosis, not the reader, looks for wrong units and axes.
-    given = resolve(campaign, model, approach, prior, plausible=False)
+    inputs = resolve(campaign, model, approach, prior, plausible=False)
     with stage("search for what is missing"):
-        result = pipeline.diagnose(*given, seed=seed)
+        result = pipeline.diagnose(*inputs, seed=seed)
     return Diagnosis(result, campaign_path(campaign))

@@ -59,11 +59,11 @@ def read_log(
     InputError
         If there is no such file, or a value is wrong.
     """
-    given = {**locals()}
+    keywords = {**locals()}
     from accelstudy.campaign.importing.log import open_log
     from accelstudy.campaign.importing.settings import layout_of
 
-    return open_log(log, layout_of(given))
+    return open_log(log, layout_of(keywords))
 
 
 @verb
@@ -164,10 +164,10 @@ def find_holds(
         accelstudy import calibration.csv --out beside --reference-log ref.csv --reference
             calibrated/calibration.json
     """
-    given = {**locals()}
+    keywords = {**locals()}
     from accelstudy.campaign.log_import import LogImport
 
-    return LogImport.of(**given).campaign
+    return LogImport.of(**keywords).campaign
 
 
 @verb

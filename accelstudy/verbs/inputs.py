@@ -31,7 +31,7 @@ def campaign_path(campaign: Any) -> Path | None:
     return None if isinstance(campaign, Campaign) else Path(campaign)
 
 
-def chosen(model: str, approach: str | None) -> tuple[SensorModel, Approach | None]:
+def model_and_approach(model: str, approach: str | None) -> tuple[SensorModel, Approach | None]:
     """Return the model and the approach that are named."""
     return get_model(model), None if approach is None else get_approach(approach)
 
@@ -40,7 +40,7 @@ def resolve(
     campaign: Any, model: str, approach: str | None, prior: Any = None, plausible: bool = True
 ) -> tuple[Campaign, SensorModel, Approach | None]:
     """Read the campaign, the model, the approach and what is known of the sensor a priori."""
-    names = chosen(model, approach)
+    names = model_and_approach(model, approach)
     return with_type(as_campaign(campaign, plausible), prior, names[0]), *names
 
 

@@ -376,20 +376,20 @@ def _documented(function: Callable[..., Any]) -> str:
     return "\n\n".join([head, *section, *others])
 
 
-def check(function: Callable[..., Any], given: Mapping[str, Any]) -> dict[str, Any]:
+def check(function: Callable[..., Any], values: Mapping[str, Any]) -> dict[str, Any]:
     """Check keywords as a verb does; those that are not given have their defaults."""
-    return {**given} | {
+    return {**values} | {
         name: one.check(value)
         for name, one in keywords(function).items()
-        if (value := given.get(name, one.default)) is not inspect.Parameter.empty
+        if (value := values.get(name, one.default)) is not inspect.Parameter.empty
     }
 
 
-def refuse_retired(function: Callable[..., Any], given: Iterable[str]) -> None:
+def refuse_retired(function: Callable[..., Any], names: Iterable[str]) -> None:
     """Say what takes the place of a keyword of earlier versions that is among those given."""
     what = "a keyword" if OPTIONS.get() is None else "an option"
     instead = RETIRED.get(function.__name__, {})
-    for old in instead.keys() & {*given}:
+    for old in instead.keys() & {*names}:
         raise InputError(f"{key(old)}: no longer {what}; {instead[old]}")
 
 
@@ -397,9 +397,9 @@ def verb(function: Callable[Arguments, Returned]) -> Callable[Arguments, Returne
     """Check the keywords of a function by their kinds, and name what is wrong as its user does."""
 
     @wraps(function)
-    def within(*args: Arguments.args, **given: Arguments.kwargs) -> Returned:
-        refuse_retired(function, given)
-        return function(*args, **check(function, given))
+    def within(*args: Arguments.args, **keywords: Arguments.kwargs) -> Returned:
+        refuse_retired(function, keywords)
+        return function(*args, **check(function, keywords))
 
     within.__doc__ = _documented(function)
     return within

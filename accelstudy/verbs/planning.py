@@ -96,10 +96,10 @@ def plan(
     --------
         accelstudy plan --tilt-accuracy 10mgon --tilt-range 30gon --sigma 2mm/s2
     """
-    given = {**locals()}
+    keywords = {**locals()}
     from accelstudy.planning.answer import plan_for
 
-    return plan_for(**given)
+    return plan_for(**keywords)
 
 
 @verb
@@ -166,10 +166,10 @@ def find_positions(
         accelstudy design --positions 12 --tilt-range 30gon --out my-scheme.yaml
         accelstudy simulate-campaign --scheme my-scheme.yaml --out designed-campaign
     """
-    given = {**locals()}
+    keywords = {**locals()}
     from accelstudy.planning.design import Design
 
-    return Design.of(**given)
+    return Design.of(**keywords)
 
 
 @verb
@@ -224,14 +224,14 @@ def advise(
     --------
         accelstudy advise my-campaign --tilt-accuracy 10mgon --tilt-range 30gon
     """
-    given = {**locals()}
+    keywords = {**locals()}
     from accelstudy.campaign.format import read_campaign
     from accelstudy.sequential.advisor import advise_session
     from accelstudy.verbs.inputs import as_campaign, campaign_path
 
-    place = campaign_path(given.pop("campaign"))
+    place = campaign_path(keywords.pop("campaign"))
     session = as_campaign(campaign) if place is None else read_campaign(place, running=True)
-    return advise_session(session, place, **given)
+    return advise_session(session, place, **keywords)
 
 
 @verb
@@ -271,10 +271,10 @@ def simulate(
     InputError
         If a name or a value is wrong, or the positions do not determine any of the models.
     """
-    given = {**locals()}
+    keywords = {**locals()}
     from accelstudy.study.result import Simulation
 
-    return Simulation.of(**given)
+    return Simulation.of(**keywords)
 
 
 @verb
@@ -312,10 +312,12 @@ def data_sheet(
     --------
         accelstudy data-sheet log.csv --rate 100 --columns fx=0,fy=1,fz=2 --out my-sensor.yaml
     """
-    given = {**locals()}
+    keywords = {**locals()}
     from accelstudy.campaign.importing.settings import settings_of
     from accelstudy.data_sheets.measured import sheet_of_campaign, sheet_of_log
 
-    path = path_of("source", given.pop("source"))
+    path = path_of("source", keywords.pop("source"))
     with stage("Allan deviation"):
-        return sheet_of_campaign(path) if path.is_dir() else sheet_of_log(path, settings_of(given))
+        if path.is_dir():
+            return sheet_of_campaign(path)
+        return sheet_of_log(path, settings_of(keywords))

@@ -152,12 +152,12 @@ def lot(
         accelstudy lot sensor-1 sensor-2 sensor-3 --out lot
     """
     from accelstudy.lots.output import Lot
-    from accelstudy.verbs.inputs import as_campaign, chosen
+    from accelstudy.verbs.inputs import as_campaign, model_and_approach
 
-    given = folders_of(campaigns)
-    check_once(given, "sensor")
-    measured = [as_campaign(one) for one in given]
-    return Lot.of(measured, *chosen(model, approach), seed, cores)
+    folders = folders_of(campaigns)
+    check_once(folders, "sensor")
+    measured = [as_campaign(one) for one in folders]
+    return Lot.of(measured, *model_and_approach(model, approach), seed, cores)
 
 
 @verb
@@ -189,17 +189,17 @@ def batch(
         accelstudy batch sensor-1 sensor-2 --out batch
     """
     from accelstudy.campaign.batch import Batch
-    from accelstudy.verbs.inputs import chosen
+    from accelstudy.verbs.inputs import model_and_approach
 
-    return Batch(folders_of(campaigns), *chosen(model, approach))
+    return Batch(folders_of(campaigns), *model_and_approach(model, approach))
 
 
 def folders_of(campaigns: Any) -> list[Any]:
     """Folders in place of the patterns that they match; anything else stands for itself."""
-    given: list[Any] = []
+    folders: list[Any] = []
     for one in as_sequence(campaigns):
         found = matches(Path(one), os.path.isdir) if isinstance(one, str | PathLike) else None
         if found == []:
             raise InputError(f"{one}: no folder has such a name")
-        given += [one] if found is None else map(Path, found)
-    return given
+        folders += [one] if found is None else map(Path, found)
+    return folders

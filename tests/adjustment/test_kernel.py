@@ -140,7 +140,7 @@ def test_the_formulas_of_every_effect(approach):
         for k, value in enumerate(formulas.write(code, table)):
             code.store(value, "y", k * LANES)
         result = np.empty((len(traced.expressions), LANES))
-        calibrate.Compiled(code.text(), "f", 0, 2).call(values.ctypes.data, result.ctypes.data)
+        calibrate.CompiledCode(code.text(), "f", 0, 2).call(values.ctypes.data, result.ctypes.data)
         expected = traced((LANES,), *values).reshape(result.shape)
         assert result == pytest.approx(expected, rel=1e-11, abs=1e-11)
 
@@ -153,7 +153,7 @@ def test_what_is_compiled_is_compiled_once(monkeypatch):
         x = code.load("x", 0)
         code.store(x + x, "x", 0)
         values = np.arange(float(LANES))
-        calibrate.Compiled(code.text(), "f", 0, 1).call(values.ctypes.data)
+        calibrate.CompiledCode(code.text(), "f", 0, 1).call(values.ctypes.data)
         assert np.array_equal(values, 2 * np.arange(LANES))
     assert len(made) == 1
 

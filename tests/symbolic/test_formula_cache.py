@@ -106,7 +106,7 @@ def test_what_is_not_of_the_package_is_not_kept():
         parameters = get_effect("bias").parameters
 
     assert formula_cache.key_of(type(get_effect("bias")), Own) is None
-    assert formula_cache.kept_under(None, "name", lambda: [1]) == [1]
+    assert formula_cache.cached_by_key(None, "name", lambda: [1]) == [1]
     assert not cache_folder(formula_cache.KIND).exists()
     patched = type("Patched", (type(get_effect("bias")),), {"output": lambda *_: (1, 1, 1)})
     assert formula_cache.key_of(patched) is None

@@ -29,7 +29,7 @@ from accelstudy.diagnosis.space.hypotheses import Hypothesis
 from accelstudy.diagnosis.space.residuals import Residuals
 from accelstudy.diagnosis.space.shapes import Place
 from accelstudy.effects import get_effect
-from accelstudy.effects.learned import ANGLES, LEARNED, UNITS, Learned
+from accelstudy.effects.learned import ANGLES, LEARNED, UNITS, LearnedFunction
 from accelstudy.effects.smooth import CYCLES, LENGTHS
 
 Array = NDArray[np.float64]
@@ -125,7 +125,7 @@ def shares_of_places(problem: Problem, names: Sequence[str]) -> dict[Place, floa
 # --- the shapes of a place ----------------------------------------------------------------------
 
 
-def shapes_of(place: Place, frame: SessionFit) -> Iterator[Learned]:
+def shapes_of(place: Place, frame: SessionFit) -> Iterator[LearnedFunction]:
     """Shapes of a place as effects, with the amplitude 1; none where no effect can stand for it.
 
     A step to the next hold is no cause, and a way that the robot moved is in no column.
@@ -162,7 +162,7 @@ def _course(frame: SessionFit) -> str:
     return "order" if frame.hold.time is None else "time"
 
 
-def _range(effect: Learned, frame: SessionFit) -> dict[str, float]:
+def _range(effect: LearnedFunction, frame: SessionFit) -> dict[str, float]:
     """Range of the coordinate of an effect in a session; none of an angle."""
     if effect.coordinate in ANGLES:
         return {}
@@ -170,17 +170,17 @@ def _range(effect: Learned, frame: SessionFit) -> dict[str, float]:
     return {"low": float(f"{values.min():.6g}"), "high": float(f"{values.max():.6g}")}
 
 
-def coordinate_values(effect: Learned, frame: SessionFit) -> Array:
+def coordinate_values(effect: LearnedFunction, frame: SessionFit) -> Array:
     """Coordinate of each component of the target of an effect in the positions, (n, c)."""
     angles = tuple(frame.angles.T)
     return np.stack(effect.arguments(tuple(frame.sensed.T), angles, frame.hold), axis=1)
 
 
-def _shape(settings: dict[str, str | float]) -> Learned:
+def _shape(settings: dict[str, str | float]) -> LearnedFunction:
     """Effect with some settings."""
     texts = (f"{k}={v if isinstance(v, str) else f'{v:.6g}'}" for k, v in settings.items())
     effect = get_effect(f"{LEARNED}({', '.join(texts)})")
-    assert isinstance(effect, Learned)
+    assert isinstance(effect, LearnedFunction)
     return effect
 
 
@@ -192,13 +192,13 @@ class PlaceShape(NamedTuple):
 
     Attributes
     ----------
-    effect : Learned, with the amplitude 1
+    effect : LearnedFunction, with the amplitude 1
     vectors, shares : (m, k) and (k,) arrays, eigenvectors and eigenvalues of K
     trace : float, of the covariance of the residuals that the amplitude 1 makes
     logs : (s,) array, log density of the residuals by `SIZES`
     """
 
-    effect: Learned
+    effect: LearnedFunction
     vectors: Array
     shares: Array
     trace: float
@@ -216,9 +216,9 @@ def weigh_place(
         trace = float(np.sum(left**2))
         if trace > RULES.visible * float(np.sum(rows**2)):
             values, turned = np.linalg.eigh(left.T @ left)
-            kept = values > 1e-6 * trace
-            vectors = left @ turned[:, kept] / np.sqrt(values[kept])
-            shares = values[kept] / trace
+            significant = values > 1e-6 * trace
+            vectors = left @ turned[:, significant] / np.sqrt(values[significant])
+            shares = values[significant] / trace
             along, square = (z @ vectors)[None] ** 2, np.array([z @ z])
             logs = evidence.densities_by_size(along, shares, square, SIZES)[0]
             weighed.append(PlaceShape(effect, vectors, shares, trace, logs))

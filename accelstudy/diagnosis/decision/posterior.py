@@ -147,12 +147,12 @@ class Posterior:
         shared: list[Explanation] = []
         for one in self.all:
             others = [cause for cause in one.causes if cause.name != UNKNOWN]
-            kept = [cause for cause in others if not {*cause.members} & {*names}]
-            if len(kept) == len(others):
+            remaining = [cause for cause in others if not {*cause.members} & {*names}]
+            if len(remaining) == len(others):
                 shared.append(one)
                 continue
             imitated = one.log_weight + np.log(RULES.prior_imitated)
             real = one.log_weight + np.log(1 - RULES.prior_imitated)
-            unknown = Explanation((*kept, NOT_LISTED), float(imitated))
+            unknown = Explanation((*remaining, NOT_LISTED), float(imitated))
             shared += [replace(one, log_weight=float(real)), unknown]
         return Posterior.of(shared)

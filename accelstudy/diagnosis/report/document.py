@@ -199,7 +199,7 @@ def positions_table(diagnosis: CampaignDiagnosis) -> pd.DataFrame:
         of f_b less gravity
     """
     d, campaign, held = diagnosis, diagnosis.campaign, diagnosis.gap.held_out
-    n, kept = campaign.n_positions, np.flatnonzero(diagnosis.used_positions)
+    n, used = campaign.n_positions, np.flatnonzero(diagnosis.used_positions)
     split = np.where(d.used_positions, "fit", "left out").astype(object)
     if held is not None:
         split[list(held.held)] = "held-out"
@@ -213,7 +213,7 @@ def positions_table(diagnosis: CampaignDiagnosis) -> pd.DataFrame:
             "split": split,
         }
     )
-    fits = (("before", d.base, np.arange(n)), ("after", d.final.solution, kept))
+    fits = (("before", d.base, np.arange(n)), ("after", d.final.solution, used))
     for when, fitted, rows in fits:
         names = ("norm",) if fitted.misclosures.shape[1] == 1 else ("x", "y", "z")
         for name, values in zip(names, fitted.misclosures.T, strict=True):

@@ -51,10 +51,10 @@ class Diagnosis(Result):
     @cached_property
     def content(self) -> dict[str, Any]:
         """Content of diagnosis.json."""
-        made = self._calibration
-        file: dict[str, Any] = {"file": None, "reason": made}
-        if not isinstance(made, str):
-            file = {"file": "calibration.json", "mended": made["mended"]}
+        calibration = self._calibration
+        file: dict[str, Any] = {"file": None, "reason": calibration}
+        if not isinstance(calibration, str):
+            file = {"file": "calibration.json", "mended": calibration["mended"]}
         return document.diagnosis_document(self.result, file)
 
     @cached_property
@@ -68,10 +68,10 @@ class Diagnosis(Result):
     @property
     def calibration(self) -> Calibration:
         """The calibration with what was found; raises `InputError` if there can be none."""
-        made = self._calibration
-        if isinstance(made, str):
-            raise InputError(f"the diagnosis gives no calibration: {made}")
-        return Calibration(document.diagnosed_fit(self.result), made)
+        content = self._calibration
+        if isinstance(content, str):
+            raise InputError(f"the diagnosis gives no calibration: {content}")
+        return Calibration(document.diagnosed_fit(self.result), content)
 
     @property
     def state(self) -> str:
@@ -100,12 +100,12 @@ class Diagnosis(Result):
     def write(self, folder: Path, place: Path) -> None:
         """Write what `accelstudy diagnose` does; diagnosis.json comes last."""
         d, calibration = self.result, self._calibration
-        made = None if isinstance(calibration, str) else calibration
+        content = None if isinstance(calibration, str) else calibration
         with stage("figures and page"):
             positions = document.positions_table(d)
             write_table(folder / "positions.parquet", positions)
-            if made is not None:
-                CalibrationDocument.write(folder, made)
+            if content is not None:
+                CalibrationDocument.write(folder, content)
             with whole_file(folder / "model.yaml") as path:
                 text = yaml.safe_dump(document.model_file(d), sort_keys=False, allow_unicode=True)
                 path.write_text(text, encoding="utf-8")
@@ -118,10 +118,10 @@ class Diagnosis(Result):
                 w=words,
                 lines=words.verdict_lines(d),
                 figures=save_all(diagnosis_figures(d, positions), folder / "figures"),
-                calibration=made,
+                calibration=content,
                 rules=RULES,
                 missing=MISSING,
-                next_steps=next_steps(d, made, self.source, place),
+                next_steps=next_steps(d, content, self.source, place),
             )
             DiagnosisDocument.write(folder, self.content)
 

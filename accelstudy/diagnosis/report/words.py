@@ -23,7 +23,7 @@ from accelstudy.diagnosis.result import CampaignDiagnosis, NamedCause
 from accelstudy.diagnosis.rules import RULES
 from accelstudy.diagnosis.shape import TARGETS, LearnedShape, coordinate_of
 from accelstudy.effects import Effect, get_effect
-from accelstudy.effects.learned import LEARNED, Learned
+from accelstudy.effects.learned import LEARNED, LearnedFunction
 from accelstudy.leveling.error import MAX_TILT_GON
 from accelstudy.pages import render_lines
 from accelstudy.sensors.plausibility import USUAL_CAUSE  # noqa: F401 (of the template)
@@ -105,7 +105,7 @@ def name_text(named: NamedCause) -> str:
     if named.name != LEARNED:
         return words(named.name)
     effect = effect_of(named)
-    assert isinstance(effect, Learned)
+    assert isinstance(effect, LearnedFunction)
     return f"the function of {coordinate_of(effect.coordinate).words}"
 
 
@@ -220,14 +220,14 @@ def without_a_name(says: Statement) -> str:
     certain = _certain(says)
     if not certain:
         return "Something is missing from the model, and it has no name here."
-    if _beside(says):
+    if _further(says):
         return f"The model lacks {certain}."
     return f"The model lacks {certain}; what is missing beside it has no name here."
 
 
 def _certain(says: Statement) -> str:
     """Say what is certain, and what may be beside it; nothing if nothing is certain."""
-    parts, beside = [part for part in says.certain if part.is_effect], _beside(says)
+    parts, beside = [part for part in says.certain if part.is_effect], _further(says)
     if len(parts) == 1 and not beside:
         return _part(parts[0], "{family}: {names}" if parts[0].family else "{names}")
     text = comma_list([_part(part) for part in parts])
@@ -237,7 +237,7 @@ def _certain(says: Statement) -> str:
     return f"{text}, and {'' if surely else 'perhaps '}{_or(beside)}"
 
 
-def _beside(says: Statement) -> list[Explanation]:
+def _further(says: Statement) -> list[Explanation]:
     """What may be beside that which is certain, if these are few."""
     worth = [one for one in says.open if one.names and one.posterior >= MIN_SAID]
     return worth if len(worth) <= RULES.many else []

@@ -85,8 +85,8 @@ class LearnedShapes(Shapes):
         covariances: list[Array] = []
         for kind, (place, rows, priors) in enumerate(_functions(frame)):
             projected = frame.residuals.project(rows)
-            left, whole = np.sum(projected**2, axis=0), np.sum(rows**2, axis=0)
-            for prior in priors[priors @ left > RULES.visible * (priors @ whole)]:
+            left, total = np.sum(projected**2, axis=0), np.sum(rows**2, axis=0)
+            for prior in priors[priors @ left > RULES.visible * (priors @ total)]:
                 used = prior > MIN_TRACE_SHARE * prior.max()
                 places.append(place)
                 kinds.append(kind)
@@ -123,9 +123,9 @@ class LearnedShapes(Shapes):
         vectors, shares = [np.zeros((m, 0))], []
         for root in roots:
             values, turned = np.linalg.eigh(root.T @ root)
-            kept = np.flatnonzero(values > MIN_TRACE_SHARE * values.sum())[-MAX_DIRECTIONS:]
-            vectors.append(root @ (turned[:, kept] / np.sqrt(values[kept])))
-            shares.append(values[kept] / values[kept].sum())
+            significant = np.flatnonzero(values > MIN_TRACE_SHARE * values.sum())[-MAX_DIRECTIONS:]
+            vectors.append(root @ (turned[:, significant] / np.sqrt(values[significant])))
+            shares.append(values[significant] / values[significant].sum())
         return cls(weights, tuple(shares), np.concatenate(vectors, axis=1), tuple(places))
 
     def orthogonal_to(self, basis: Array) -> LearnedShapes:
@@ -259,9 +259,9 @@ def _on_the_sphere(f: Array) -> tuple[Array, Array]:
     features, weights = [], []
     for length in LENGTHS[1:]:
         values, vectors = np.linalg.eigh(_covariance(some, some, length))
-        kept = values[-DIRECTIONS:]
-        features.append(_covariance(unit, some, length) @ vectors[:, -DIRECTIONS:] / kept)
-        weights.append(kept)
+        largest = values[-DIRECTIONS:]
+        features.append(_covariance(unit, some, length) @ vectors[:, -DIRECTIONS:] / largest)
+        weights.append(largest)
     return np.concatenate(features, axis=1)[:, None], np.asarray(block_diag(*weights))
 
 
