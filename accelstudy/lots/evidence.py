@@ -2,15 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field, replace
-from types import MappingProxyType
-from typing import NamedTuple
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
 
-from accelstudy.adjustment.quality import Solution
 from accelstudy.approaches import Approach
 from accelstudy.basics.wording import words
 from accelstudy.campaign.session import Campaign
@@ -21,6 +19,7 @@ from accelstudy.diagnosis.evidence.noise_tests import LEVEL as LEVEL_OF_NOISE
 from accelstudy.diagnosis.evidence.sets import weigh_sets
 from accelstudy.diagnosis.evidence.size import Evidence, Level
 from accelstudy.diagnosis.rules import RULES
+from accelstudy.diagnosis.space.frame import SessionFit
 from accelstudy.lots.noise import NoisePrior
 from accelstudy.sensors.sensor import SensorModel
 
@@ -53,10 +52,7 @@ class SensorEvidence:
     specs : dict of effect to its best setting
     shapes : dict of lasting effects that show to their shapes
     tested : dict of what is tested to its log odds and, behind that, those in noise alone, (1 + s,)
-    z : (m,) array, residuals of unit weight
-    sigma : float, m/s², of a position mean, by which they were weighted
-    redundancy : int, of its calibration
-    solution : Solution, of the campaign; None where it does not determine the model
+    base : BaseFit, of the campaign; None where it does not determine the model
     """
 
     campaign: str
@@ -67,10 +63,12 @@ class SensorEvidence:
     specs: dict[str, str] = field(default_factory=dict)
     shapes: dict[str, tuple[str, ...]] = field(default_factory=dict)
     tested: dict[str, NDArray[np.float32]] = field(default_factory=dict)
-    z: Array = field(default_factory=lambda: np.zeros(0))
-    sigma: float = 1.0
-    redundancy: int = 0
-    solution: Solution | None = None
+    base: BaseFit | None = None
+
+    @cached_property
+    def frame(self) -> SessionFit | None:
+        """The calibration of the campaign, in which effects are evaluated."""
+        return None if self.base is None else SessionFit.of(self.base.solution)
 
 
 @dataclass(frozen=True, eq=False)
@@ -121,7 +119,7 @@ def _weighed(sensor: Sensor) -> SensorEvidence:
     problem = pose(sensor.fit(), np.random.SeedSequence(sensor.seed))
     detection, singles, chance = problem.detection, problem.singles, problem.chance
     residuals, evidence = problem.residuals, problem.evidence
-    z, square = residuals.z, float(residuals.z @ residuals.z)
+    square = float(residuals.z @ residuals.z)
     # A sensor with a noise of its own is no usual one.
     usual = detection.noise if noise is None else detection.noise[:1]
     nothing = float(np.logaddexp.reduce(usual))
@@ -142,10 +140,10 @@ def _weighed(sensor: Sensor) -> SensorEvidence:
     return SensorEvidence(
         campaign=sensor.campaign.name,
         p_value=detection.p_value,
-        odds={name: log - nothing for name, log in logs.items()} | _unknown(problem, nothing),
+        odds={name: log - nothing for name, log in logs.items()} | unknown_odds(problem, nothing),
         pairs=pairs,
         classes=tuple(one.members for one in problem.classes),
-        specs=_specs(problem),
+        specs=best_settings(problem),
         shapes={
             name: tuple(effect.spec for effect in effects)
             for name, shapes in problem.frame.candidates.items()
@@ -153,10 +151,7 @@ def _weighed(sensor: Sensor) -> SensorEvidence:
             and not effects[0].sudden
         },
         tested=dict(zip(problem.field.names, odds.T, strict=True)),
-        z=z,
-        sigma=problem.base.sigma,
-        redundancy=residuals.redundancy,
-        solution=problem.frame.solution,
+        base=problem.base,
     )
 
 
@@ -177,27 +172,8 @@ def _by_chance(problem: Problem, chance: Chance, noise: NoisePrior | None) -> Ar
     return odds(chance.errors(problem.residuals))
 
 
-class MeanEvidence(NamedTuple):
-    """What the mean residuals of sensors in the same positions show, which all of them have.
-
-    Attributes
-    ----------
-    p_value : float, of anything missing
-    odds : mapping of what has no name to its log odds
-    specs : mapping of effects to their best settings
-    """
-
-    p_value: float = 1.0
-    odds: Mapping[str, float] = MappingProxyType({})
-    specs: Mapping[str, str] = MappingProxyType({})
-
-
-NO_MEAN = MeanEvidence()
-"""Of sensors in different positions, nothing."""
-
-
-def weigh_mean(sensors: Sequence[Sensor], said: Sequence[SensorEvidence]) -> MeanEvidence:
-    """Weigh the mean residuals of sensors.
+def pose_mean(sensors: Sequence[Sensor], said: Sequence[SensorEvidence]) -> Problem | None:
+    """Return the problem that the mean residuals of sensors pose, or None if they have no mean.
 
     What all sensors have is as large in the mean, and the noise is smaller by the root of their
     number. So it shows what has no name, too. Sensors that were in different positions or
@@ -211,26 +187,24 @@ def weigh_mean(sensors: Sequence[Sensor], said: Sequence[SensorEvidence]) -> Mea
     """
     first, models = sensors[0].campaign, [sensor.model for sensor in sensors]
     sudden = any(effect.sudden for model in models if model for effect in model.effects)
-    alike = len({one.z.shape for one in said}) == 1
+    frames = [one.frame for one in said if one.frame is not None]
+    alike = len({frame.residuals.z.shape for frame in frames}) == 1
     if sudden or not alike or not all(_alike(first, each.campaign) for each in sensors):
-        return NO_MEAN
-    weights = np.array([1 / one.sigma for one in said])
+        return None
+    weights = np.array([1 / one.base.sigma for one in said if one.base is not None])
     weights /= np.linalg.norm(weights)
-    table = np.array([one.z for one in said])
-    z, freedom = weights @ table, (len(said) - 1) * said[0].redundancy
+    table = np.array([frame.residuals.z for frame in frames])
+    z, freedom = weights @ table, float((len(said) - 1) * frames[0].residuals.redundancy)
     # The scatter about the mean tells the noise, whatever the campaigns state.
     apart = float(np.sum((table - np.outer(weights, z)) ** 2)) / freedom
-    problem = pose(sensors[0].fit(), np.random.SeedSequence(sensors[0].seed))
-    level = Level((1.0,), (min(float(freedom), RULES.freedom_given),), known=True)
-    mean = replace(problem.residuals, errors=z / np.sqrt(max(apart, MIN_VARIANCE)))
-    frame = replace(problem.frame, residuals=mean)
-    problem = Problem(replace(problem.base, level=level), frame, problem.seed)
-    detection = problem.detection
-    nothing = float(np.logaddexp.reduce(detection.noise))
-    return MeanEvidence(detection.p_value, _unknown(problem, nothing), _specs(problem))
+    level = Level((1.0,), (min(freedom, RULES.freedom_given),), known=True)
+    mean = replace(frames[0].residuals, errors=z / np.sqrt(max(apart, MIN_VARIANCE)))
+    base = BaseFit(frames[0].solution, level, None)
+    frame = replace(frames[0], residuals=mean)
+    return Problem(base, frame, np.random.SeedSequence(sensors[0].seed))
 
 
-def _unknown(problem: Problem, nothing: float) -> dict[str, float]:
+def unknown_odds(problem: Problem, nothing: float) -> dict[str, float]:
     """Log odds of functions without a name against nothing, by their places."""
     if problem.unknown is None:
         return {}
@@ -238,7 +212,7 @@ def _unknown(problem: Problem, nothing: float) -> dict[str, float]:
     return {f"{UNKNOWN}({of} → {target})": float(log) - nothing for (of, target), log in places}
 
 
-def _specs(problem: Problem) -> dict[str, str]:
+def best_settings(problem: Problem) -> dict[str, str]:
     """Effects in the settings that explain most."""
     best = problem.singles.best.items()
     return {name: one.effect.spec for name, one in best if one.place is None}

@@ -18,20 +18,19 @@ sensors, it has the odds of their mean.
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterable, Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, field
-from functools import cache, cached_property, reduce
-from itertools import combinations
-from typing import TypeVar
+from functools import cache, cached_property
+from itertools import combinations, product
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy import special
 
-from accelstudy.lots.sizes import Names, TypeSizes, most_likely
+from accelstudy.lots.sizes import Names, TypeSizes, most_likely, subsets_of
 
 Array = NDArray[np.float64]
-T = TypeVar("T")
 
 PRIOR_ODD = 0.01
 """Prior probability that a sensor is odd."""
@@ -47,8 +46,89 @@ MAX_SINGLES, MAX_EXTENDED = 12, 3
 """Most probable effects of which pairs are tried, and of these the ones that are in every pair."""
 MIN_POSTERIOR = 1e-6
 """Posterior below which a set does not count."""
-NODES = {1: 64, 2: 24}
+NODES = (0, 64, 24)
 """Nodes of the integral over each share below 1, by the number of effects."""
+STEPS = 400
+"""Steps in which the posterior of a share is told."""
+
+
+class Shares(NamedTuple):
+    """Nodes of the integral over the shares of some effects.
+
+    Attributes
+    ----------
+    nodes : (k, q) array, shares
+    log_weights : (q,) array, log of the prior of each node
+    log_priors : (s + 1, 1, q) array, log probabilities that a sensor has each of the subsets of the
+        effects, and that it is odd
+    """
+
+    nodes: Array
+    log_weights: Array
+    log_priors: Array
+
+
+@cache
+def shares_of(size: int) -> Shares:
+    """Nodes of the integral over the shares of `size` effects."""
+    one, weights = _share_nodes(NODES[size])
+    nodes = np.array([*product(one, repeat=size)]).T
+    has = np.array([[k in some for k in range(size)] for some in subsets_of(range(size))])
+    with np.errstate(divide="ignore"):
+        each = np.where(has[..., None], np.log(nodes), np.log1p(-nodes))
+    priors = np.log(1 - PRIOR_ODD) + each.sum(axis=1)
+    log_weights = np.log([np.prod(each) for each in product(weights, repeat=size)])
+    odd = np.full((1, len(log_weights)), np.log(PRIOR_ODD))
+    return Shares(nodes, log_weights, np.concatenate([priors, odd])[:, None])
+
+
+def _share_nodes(count: int) -> tuple[Array, Array]:
+    """Nodes and weights of the integral over one share, of which 1 is the last."""
+    nodes, weights = np.polynomial.legendre.leggauss(count) if count else np.zeros((2, 0))
+    return np.append((nodes + 1) / 2, 1.0), np.append((1 - PRIOR_ALL) * weights / 2, PRIOR_ALL)
+
+
+@dataclass(frozen=True, eq=False)
+class EffectSet:
+    """What sensors tell of a set of effects, if the model of the lot lacks these.
+
+    Attributes
+    ----------
+    names : tuple of str
+    odds : (w, s + 1, n) array, log odds of the sensors for each subset, and for being odd, by the
+        ways in which sizes may differ
+    log_weights : (w, q) array, log evidence times prior weight of these ways and of the shares
+    """
+
+    names: Names
+    odds: Array
+    log_weights: Array
+
+    @cached_property
+    def log_weight(self) -> float:
+        """Log of evidence times prior weight."""
+        return float(special.logsumexp(self.log_weights))
+
+    @cached_property
+    def sensors(self) -> Array:
+        """Posterior of each sensor to have each of the subsets, and to be odd, (s + 1, n)."""
+        priors, posterior = shares_of(len(self.names)).log_priors, np.zeros(self.odds.shape[1:])
+        for odds, shares in zip(self.odds, special.softmax(self.log_weights), strict=True):
+            posterior += special.softmax(odds[..., None] + priors, axis=0) @ shares
+        return posterior
+
+    def share(self, name: str) -> Array:
+        """Posterior of the share of the sensors that have an effect, at `STEPS` + 1 shares."""
+        below, weights = _share_nodes(NODES[len(self.names)])
+        grid = special.softmax(self.log_weights).sum(axis=0)
+        grid = grid.reshape((len(below),) * len(self.names))
+        mass = np.moveaxis(grid, self.names.index(name), 0).reshape(len(below), -1).sum(axis=1)
+        # Narrow steps between the nodes of the integral.
+        log = np.log(np.maximum(mass / weights, 1e-300))[:-1]
+        fine = np.exp(np.interp(np.linspace(0, 1, STEPS + 1), below[:-1], log))
+        density = mass[:-1].sum() * fine / fine.sum()
+        density[-1] += mass[-1]
+        return np.asarray(density)
 
 
 @dataclass(frozen=True, eq=False)
@@ -72,27 +152,26 @@ class Mixture:
     common: Mapping[str, float] = field(default_factory=dict)
     sizes: TypeSizes | None = None
     few: float = 0.0
-    _known: dict[Names, list[tuple[Array, Array]]] = field(default_factory=dict, init=False)
 
     @cached_property
-    def sets(self) -> dict[Names, float]:
-        """Sets of effects of the lot with log of evidence times prior weight, strongest first."""
-        found: dict[Names, float] = {(): np.log(1 - PRIOR_MISSING) + self._evidence(())}
+    def sets(self) -> dict[Names, EffectSet]:
+        """Sets of effects of the lot, the most probable first."""
+        found: dict[Names, EffectSet] = {(): self._weigh((), 1 - PRIOR_MISSING)}
         for name, prior in self.prior.items():
-            weight = np.log(PRIOR_MISSING * (1 - PRIOR_FURTHER) * prior)
-            found[name,] = weight + self._evidence((name,))
-        singles = sorted(self.prior, key=lambda name: -found[name,])[:MAX_SINGLES]
-        weight, pairs = PRIOR_MISSING * PRIOR_FURTHER, special.comb(len(self.prior), 2)
+            found[name,] = self._weigh((name,), PRIOR_MISSING * (1 - PRIOR_FURTHER) * prior)
+        singles = sorted(self.prior, key=lambda name: -found[name,].log_weight)[:MAX_SINGLES]
+        each = PRIOR_MISSING * PRIOR_FURTHER / max(special.comb(len(self.prior), 2), 1)
         for one, other in combinations(singles, 2):
             if one in singles[:MAX_EXTENDED]:
                 both = min(one, other), max(one, other)
-                found[both] = np.log(weight / pairs) + self._evidence(both)
-        return dict(sorted(found.items(), key=lambda item: -item[1]))
+                found[both] = self._weigh(both, each)
+        return dict(sorted(found.items(), key=lambda item: -item[1].log_weight))
 
     @cached_property
     def posterior(self) -> dict[Names, float]:
         """Posterior of each of `sets`."""
-        return dict(zip(self.sets, special.softmax([*self.sets.values()]).tolist(), strict=True))
+        p = special.softmax([one.log_weight for one in self.sets.values()])
+        return dict(zip(self.sets, p.tolist(), strict=True))
 
     def of_any(self, effects: Collection[str]) -> float:
         """Posterior probability that any of some effects is one of the lot."""
@@ -102,46 +181,30 @@ class Mixture:
         """Posterior probability that all of some effects are of the lot."""
         return sum(p for names, p in self.posterior.items() if {*names} >= {*effects})
 
+    @property
+    def _probable(self) -> list[tuple[EffectSet, float]]:
+        """Sets that count, with their posterior."""
+        return [(self.sets[s], p) for s, p in self.posterior.items() if p > MIN_POSTERIOR]
+
     def share(self, name: str) -> tuple[float, float, float]:
         """Share of the sensors that have an effect: mean, and the interval that holds 95 %."""
-        grid, density = np.linspace(0, 1, 401), np.zeros(401)
-        for names, p in self.posterior.items():
-            if name in names and p > MIN_POSTERIOR:
-                # A mixture of narrow steps between the nodes of the integral.
-                nodes, weights = _nodes(len(names))
-                place = 1 + names.index(name)
-                others = tuple(axis for axis in range(1 + len(names)) if axis != place)
-                mass = self._shares(names).sum(axis=others)
-                log = np.log(np.maximum(mass / weights, 1e-300))
-                fine = np.exp(np.interp(grid, nodes[:-1], log[:-1]))
-                density += p * mass[:-1].sum() * fine / fine.sum()
-                density[-1] += p * mass[-1]
+        having = [(one, p) for one, p in self._probable if name in one.names]
+        density = np.sum([p * one.share(name) for one, p in having], axis=0)
         density /= density.sum()
-        low, high = grid[np.minimum(np.searchsorted(np.cumsum(density), [0.025, 0.975]), 400)]
+        grid = np.linspace(0, 1, STEPS + 1)
+        low, high = grid[np.minimum(np.searchsorted(np.cumsum(density), [0.025, 0.975]), STEPS)]
         return float(grid @ density), float(low), float(high)
 
     @cached_property
     def sensors(self) -> tuple[dict[Names, Array], Array]:
         """Posterior of each sensor to have a set of effects, {set: (n,)}, and to be odd, (n,)."""
-        of_sets: dict[Names, Array] = {}
-        odd = np.zeros(len(self._anything))
-        for names, p in self.posterior.items():
-            if p < MIN_POSTERIOR:
-                continue
-            of_set, odd_in_set = self.sensors_under(names)
-            for subset, mass in of_set.items():
-                of_sets[subset] = of_sets.get(subset, 0.0) + p * mass
-            odd += p * odd_in_set
+        of_sets, odd = dict[Names, Array](), np.zeros(len(self._anything))
+        for one, p in self._probable:
+            *each, odd_in_set = p * one.sensors
+            odd += odd_in_set
+            for subset, mass in zip(subsets_of(one.names), each, strict=True):
+                of_sets[subset] = of_sets.get(subset, 0.0) + mass
         return of_sets, odd
-
-    def sensors_under(self, names: Names) -> tuple[dict[Names, Array], Array]:
-        """Return what `sensors` has, if the model of the lot lacks some effects."""
-        table = np.zeros((len(_subsets(names)) + 1, len(self._anything)))
-        for shares, (_, odds) in zip(self._shares(names), self._ways(names), strict=True):
-            logs = self._contributions(names, odds)
-            of_each = np.exp(logs - np.logaddexp.reduce(logs))
-            table += of_each.reshape(*table.shape, -1) @ np.ravel(shares)
-        return dict(zip(_subsets(names), table[:-1], strict=True)), table[-1]
 
     def having(self, name: str) -> Array:
         """Posterior of each sensor to have an effect, (n,)."""
@@ -160,101 +223,36 @@ class Mixture:
             return np.zeros(len(self._anything))
         # Two that were not weighed together say no more than the weaker one.
         weaker = np.min([self.odds[name] for name in subset], axis=0)
-        known = self.pairs.get(subset, np.float64(-np.inf))
-        return np.where(np.isneginf(known), weaker, known)
+        together = self.pairs.get(subset, np.float64(-np.inf))
+        return np.where(np.isneginf(together), weaker, together)
 
-    def _contributions(self, names: Names, odds: Array) -> Array:
-        """Log of what each of `_subsets`, and oddness, contributes, (s + 1, n, nodes ...).
+    def _weigh(self, names: Names, prior: float) -> EffectSet:
+        """Weigh a set of effects by the ways in which sizes may differ.
 
-        Parameters
-        ----------
-        names : some effects
-        odds : (s, n) array, log odds of the sensors for each of their subsets
+        Of a sensor that is not usual, whose noise may be another one as well, sizes of the type say
+        no more than it says by itself. What few sensors have, has no sizes of a type.
         """
-        each = np.array([*odds, self._anything])
-        return each.reshape(*each.shape, *[1] * len(names)) + _priors(len(names))
-
-    def _evidence(self, names: Names) -> float:
-        """Log evidence of effects, whatever their sizes."""
-        return float(special.logsumexp([logs for logs, _ in self._ways(names)]))
-
-    def _ways(self, names: Names) -> list[tuple[Array, Array]]:
-        """Log evidence by the ways in which sizes differ, (nodes ...) of shares, and odds then.
-
-        The odds are those of `_contributions`. Of a sensor that is not usual, whose noise may be
-        another one as well, sizes of the type say no more than it says by itself.
-        """
-        if names in self._known:
-            return self._known[names]
+        own = np.array([self._of_own_sizes(subset) for subset in subsets_of(names)])
         types = [] if self.sizes is None else self.sizes.of_set(names)
-        own = np.array([self._of_own_sizes(subset) for subset in _subsets(names)])
         if types and min(most_likely(types).shares.values()) * own.shape[1] <= self.few:
             types = []
-        odds, priors = [own], [np.log(1 - PRIOR_ALIKE) if types else 0.0]
+        ways = [(prior * (1 - PRIOR_ALIKE) if types else prior, 0.0, own)]
         for one in types:
             assert self.sizes is not None
-            alike = np.array([one.odds[subset] for subset in _subsets(names)])
-            odds.append(np.where(self.sizes.usual, alike, np.minimum(alike, own)))
-            priors.append(np.log(PRIOR_ALIKE / len(types)) + one.cost)
-        weights, ways = _log_weights(len(names)), list[tuple[Array, Array]]()
-        for each, prior in zip(odds, priors, strict=True):
-            logs = np.logaddexp.reduce(self._contributions(names, each)).sum(axis=0)
-            ways.append((logs + weights + prior, each))
-        if len(names) == 1 and names[0] in self.common:
+            odds = np.where(self.sizes.usual, one.odds, np.minimum(one.odds, own))
+            ways.append((prior * PRIOR_ALIKE / len(types), one.cost, odds))
+        shares, of_ways = shares_of(len(names)), list[Array]()
+        each = np.array([np.vstack([odds, self._anything]) for *_, odds in ways])
+        for (weight, cost, _), odds in zip(ways, each, strict=True):
+            of_sensors = np.logaddexp.reduce(odds[..., None] + shares.log_priors)
+            of_ways.append(np.log(weight) + cost + of_sensors.sum(axis=0) + shares.log_weights)
+        logs = np.array(of_ways)
+        same = self.common.get(names[0]) if len(names) == 1 else None
+        if same is not None:
             # Which of the sensors have it, is not asked then.
-            ((logs, _),) = ways
-            alone, same = special.logsumexp(logs), self.common[names[0]]
-            both = np.logaddexp(np.log(1 - PRIOR_ALIKE) + alone, np.log(PRIOR_ALIKE) + same)
-            ways = [(logs + both - alone, own)]
-        self._known[names] = ways
-        return ways
-
-    def _shares(self, names: Names) -> Array:
-        """Posterior of each way in which sizes differ and of the shares, (w, nodes ...)."""
-        return np.asarray(special.softmax([logs for logs, _ in self._ways(names)]))
-
-
-def _subsets(names: Iterable[T]) -> list[tuple[T, ...]]:
-    """Subsets of some effects, all of which a sensor may have."""
-    given = [*names]
-    return [s for r in range(len(given) + 1) for s in combinations(given, r)]
-
-
-@cache
-def _nodes(size: int) -> tuple[Array, Array]:
-    """Nodes and weights of the integral over a share, if there are `size` of them."""
-    nodes, weights = np.polynomial.legendre.leggauss(NODES[size]) if size else np.zeros((2, 0))
-    return np.append((nodes + 1) / 2, 1.0), np.append((1 - PRIOR_ALL) * weights / 2, PRIOR_ALL)
-
-
-@cache
-def _priors(size: int) -> Array:
-    """Log of the prior of each of the subsets of `size` effects, and of oddness, by the shares.
-
-    Returns
-    -------
-    (s + 1, 1, nodes ...) array
-    """
-    nodes = _nodes(size)[0]
-    shares, usual = np.meshgrid(*[nodes] * size, indexing="ij"), np.zeros((len(nodes),) * size)
-    usual += np.log(1 - PRIOR_ODD)
-    priors = [
-        sum((np.log(r) if k in has else _log_of_rest(r) for k, r in enumerate(shares)), usual)
-        for has in _subsets(range(size))
-    ]
-    return np.array([*priors, np.full_like(usual, np.log(PRIOR_ODD))])[:, None]
-
-
-def _log_of_rest(share: Array) -> Array:
-    """Logarithm of 1 − share; −inf where the share is 1."""
-    with np.errstate(divide="ignore"):
-        return np.log1p(-share)
-
-
-@cache
-def _log_weights(size: int) -> Array:
-    """Log of prior weights of the nodes of all shares, (nodes ...)."""
-    return np.asarray(np.log(reduce(np.multiply.outer, [_nodes(size)[1]] * size, np.ones(()))))
+            alone = special.logsumexp(logs) - np.log(prior)
+            logs = logs + special.logsumexp([0.0, same - alone], b=[1 - PRIOR_ALIKE, PRIOR_ALIKE])
+        return EffectSet(names, each, logs)
 
 
 def p_value(
@@ -273,11 +271,14 @@ def p_value(
     names = sorted({name for sensor in tested for name in sensor})
     if not names:
         return 1.0
-    (nodes, prior_of_share), by_effect = _nodes(2), list[Array]()
+    nodes, prior = _share_nodes(NODES[2])
+    with np.errstate(divide="ignore"):
+        has, lacks = np.log(nodes), np.log1p(-nodes)
+    by_effect = list[Array]()
     for name in names:
         each = (sensor[name][:, None] for sensor in tested if name in sensor)
-        logs = sum(np.logaddexp(_log_of_rest(nodes), odds + np.log(nodes)) for odds in each)
+        logs = sum(np.logaddexp(lacks, odds + has) for odds in each)
         weight = weights.get(name, 1 / len(names))
-        by_effect.append(special.logsumexp(logs + np.log(prior_of_share * weight), axis=-1))
+        by_effect.append(special.logsumexp(logs + np.log(prior * weight), axis=-1))
     total = special.logsumexp(by_effect, axis=0)
     return float((1 + np.sum(total[1:] >= total[0])) / len(total))

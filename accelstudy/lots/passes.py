@@ -12,16 +12,17 @@ import numpy as np
 from numpy.typing import NDArray
 
 from accelstudy.basics.progress import track
+from accelstudy.diagnosis.decision.problem import Problem
 from accelstudy.diagnosis.evidence.candidates import UNKNOWN
 from accelstudy.diagnosis.evidence.noise_tests import AXES, NOISES, TAILS
 from accelstudy.diagnosis.rules import RULES
 from accelstudy.lots.evidence import (
-    NO_MEAN,
-    MeanEvidence,
     Sensor,
     SensorEvidence,
+    best_settings,
     lot_classes,
-    weigh_mean,
+    pose_mean,
+    unknown_odds,
 )
 from accelstudy.lots.mixture import Mixture, p_value
 from accelstudy.lots.sizes import Derivatives, Names, TypeSizes
@@ -97,13 +98,13 @@ class Pass:
     sensors : tuple of Sensor
     evidence : tuple of SensorEvidence, theirs
     sizes : TypeSizes, of effects that most sensors show; None where there are none
-    mean : MeanEvidence, of the sensors that are not odd
+    mean : Problem, that the mean residuals of the sensors pose which are not odd; None without one
     """
 
     sensors: tuple[Sensor, ...]
     evidence: tuple[SensorEvidence, ...]
     sizes: TypeSizes | None = None
-    mean: MeanEvidence = NO_MEAN
+    mean: Problem | None = None
 
     @classmethod
     def of(cls, sensors: Sequence[Sensor], mapped: Mapped) -> Pass:
@@ -117,27 +118,23 @@ class Pass:
         each = track(mapped(Sensor.evidence, sensors), "evidence of the sensors", len(sensors))
         one = cls(tuple(sensors), tuple(each))
         # What is common to all is that of the sensors which are not odd whatever their sizes.
-        usual = np.isin(np.arange(len(sensors)), one.usual)
-        some = [i for i in one.usual if one.evidence[i].solution]
+        some = [i for i in one.usual if one.evidence[i].base]
         said = [one.evidence[i] for i in some]
         if len(some) < 2:
             return one
-        one = replace(one, mean=weigh_mean([sensors[i] for i in some], said))
-        first: dict[str, Sequence[str]] = {}
-        for shown in said:
-            first = {**shown.shapes, **first}
+        one = replace(one, mean=pose_mean([sensors[i] for i in some], said))
+        refined = {} if one.mean is None else best_settings(one.mean)
         count = Counter(name for shown in said for name in shown.shapes)
-        refined = {name: (spec,) for name, spec in one.mean.specs.items()}
-        shapes = {
-            name: (*first[name], *refined.get(name, ()))
-            for name in sorted(first)
-            if 2 * count[name] > len(said)
-        }
+        shapes = dict[str, Sequence[str]]()
+        for name in sorted(name for name, times in count.items() if 2 * times > len(said)):
+            first = next(shown.shapes[name] for shown in said if name in shown.shapes)
+            shapes[name] = [*first, *([refined[name]] if name in refined else [])]
         if not shapes:
             return one
         specs = [spec for tried in shapes.values() for spec in tried]
-        told = [Derivatives.of(each.solution, specs) for each in one.evidence]
-        redundancy = sum(shown.redundancy for shown in said)
+        told = [Derivatives.of(each.frame, specs) for each in one.evidence]
+        usual = np.isin(np.arange(len(sensors)), some)
+        redundancy = sum(shown.frame.residuals.redundancy for shown in said if shown.frame)
         return replace(one, sizes=TypeSizes.of(told, shapes, usual, redundancy))
 
     @cached_property
@@ -166,7 +163,14 @@ class Pass:
         counts = Counter(kinds.values())
         total = sum(WEIGHTS[kind] for kind in counts)
         prior = {name: WEIGHTS[kind] / counts[kind] / total for name, kind in kinds.items()}
-        return Mixture(odds, pairs, prior, self.mean.odds, self.sizes, self._few)
+        return Mixture(odds, pairs, prior, self._common, self.sizes, self._few)
+
+    @property
+    def _common(self) -> dict[str, float]:
+        """Log odds of what has no name, that it is the same in all sensors."""
+        if self.mean is None:
+            return {}
+        return unknown_odds(self.mean, float(np.logaddexp.reduce(self.mean.detection.noise)))
 
     @cached_property
     def p_value(self) -> float:
@@ -176,7 +180,7 @@ class Pass:
         for both.
         """
         each = p_value([one.tested for one in self.evidence], {UNKNOWN: RULES.prior_unknown})
-        return each if self.mean is NO_MEAN else min(2 * min(each, self.mean.p_value), 1.0)
+        return each if self.mean is None else min(2 * min(each, self.mean.detection.p_value), 1.0)
 
     @property
     def missing(self) -> bool:
@@ -187,7 +191,7 @@ class Pass:
     def wrong(self) -> float:
         """Posterior probability that the model lacks anything, or that a sensor is odd."""
         nothing = self.mixture.posterior[()]
-        none_odd = np.prod(1 - self.mixture.sensors_under(())[1]) if nothing > 0 else 1.0
+        none_odd = np.prod(1 - self.mixture.sets[()].sensors[-1]) if nothing > 0 else 1.0
         return float(max(1 - nothing * none_odd, 1e-300))
 
     @cached_property

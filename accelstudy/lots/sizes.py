@@ -16,14 +16,14 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
 from contextlib import suppress
-from dataclasses import dataclass, field
+from dataclasses import dataclass
+from functools import cached_property
 from itertools import combinations
-from typing import NamedTuple
+from typing import NamedTuple, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
 
-from accelstudy.adjustment.quality import Solution
 from accelstudy.basics.errors import InputError
 from accelstudy.diagnosis.evidence.size import SIZE_WEIGHTS, SIZES, log_mean
 from accelstudy.diagnosis.rules import RULES
@@ -31,6 +31,7 @@ from accelstudy.diagnosis.space.frame import SessionFit
 from accelstudy.effects import get_effect
 
 Array = NDArray[np.float64]
+T = TypeVar("T")
 Names = tuple[str, ...]
 """Names of some effects, in order."""
 
@@ -62,15 +63,14 @@ class Derivatives(NamedTuple):
     z: Array
 
     @classmethod
-    def of(cls, solution: Solution | None, specs: Iterable[str]) -> Derivatives:
+    def of(cls, frame: SessionFit | None, specs: Iterable[str]) -> Derivatives:
         """Evaluate effects in a campaign; what it cannot show is zero.
 
         Parameters
         ----------
-        solution : Solution, of the campaign; None for one that shows nothing
+        frame : SessionFit, of the campaign; None for one that shows nothing
         specs : the effects
         """
-        frame = None if solution is None else SessionFit.of(solution)
         z = np.zeros(0) if frame is None else frame.residuals.z
         columns, squares = dict[str, Array](), dict[str, Array]()
         for spec in specs:
@@ -88,14 +88,14 @@ class TypicalSet(NamedTuple):
 
     Attributes
     ----------
-    odds : dict of the subsets that a sensor may have to (n,) array, log odds of the sensors
+    odds : (s, n) array, log odds of the sensors for the subsets of the effects
     log_likelihood : float, of sizes and shares
     cost : float, log of evidence over likelihood: what fitting the sizes costs
     mean : (k,) array, μ of the parameters, side by side
     shares : dict of effect to ρ
     """
 
-    odds: dict[Names, Array]
+    odds: Array
     log_likelihood: float
     cost: float
     mean: Array
@@ -109,18 +109,17 @@ class TypeSizes:
     Attributes
     ----------
     specs : dict of effect to its setting that explains most of what the sensors have in common
-    columns : dict of effect to places of its parameters
+    effects : (k,) array of str, effect of each parameter
     normal : (n, k, k) array, N of the sensors, turned to what shows, in units of the noise
     right : (n, k) array, b
     usual : (n,) bool array, sensors by which sizes are estimated
     """
 
     specs: dict[str, str]
-    columns: dict[str, NDArray[np.int_]]
+    effects: NDArray[np.str_]
     normal: Array
     right: Array
     usual: NDArray[np.bool_]
-    _known: dict[Names, list[TypicalSet]] = field(default_factory=dict, init=False)
 
     @classmethod
     def of(
@@ -140,35 +139,35 @@ class TypeSizes:
         redundancy : int, of the usual sensors
         """
         some = [one for one, is_usual in zip(each, usual, strict=True) if is_usual]
-        specs, turns = dict[str, str](), list[Array]()
+        specs, turns = dict[str, str](), dict[str, Array]()
         for name, tried in shapes.items():
             parts, turned = zip(*(_shown(some, spec) for spec in tried), strict=True)
             best = int(np.argmax(parts))
             if turned[best].size:
-                specs[name] = tried[best]
-                turns.append(turned[best])
-        ends = np.cumsum([0, *(turn.shape[1] for turn in turns)])
-        columns = {name: np.arange(*ends[k : k + 2]) for k, name in enumerate(specs)}
-        normal, right = np.zeros((len(each), ends[-1], ends[-1])), np.zeros((len(each), ends[-1]))
+                specs[name], turns[name] = tried[best], turned[best]
+        effects = np.repeat([*turns], [turn.shape[1] for turn in turns.values()])
+        normal, right = (
+            np.zeros((len(each), *[len(effects)] * 2)),
+            np.zeros((len(each), len(effects))),
+        )
         for i, one in enumerate(each if turns else ()):
-            turned_columns = zip(specs.values(), turns, strict=True)
-            a = np.concatenate([one.columns[s] @ turn for s, turn in turned_columns], axis=1)
+            a = np.concatenate([one.columns[specs[name]] @ turns[name] for name in turns], axis=1)
             normal[i], right[i] = a.T @ a, one.z @ a
-        raw = cls(specs, columns, normal, right, usual)
+        raw = cls(specs, effects, normal, right, usual)
         variance = raw._variance(sum(float(one.z @ one.z) for one in some), redundancy)
-        return cls(specs, columns, normal / variance, right / variance, usual)
+        return cls(specs, effects, normal / variance, right / variance, usual)
 
     def only(self, places: Sequence[int]) -> TypeSizes:
         """Return what some of the sensors tell."""
         at = [*places]
         some = self.normal[at], self.right[at], self.usual[at]
-        return TypeSizes(self.specs, self.columns, *some)
+        return TypeSizes(self.specs, self.effects, *some)
 
     def _variance(self, squares: float, redundancy: int) -> float:
         """Noise variance that the best one or two effects leave."""
         left = [squares / redundancy]
-        for names in (s for r in (1, 2) for s in combinations(self.columns, r)):
-            at = self._places(names)
+        for names in (s for r in (1, 2) for s in combinations(self.specs, r)):
+            at = np.flatnonzero(np.isin(self.effects, names))
             b = self.right[self.usual][:, at]
             n = self.normal[self.usual][:, at[:, None], at]
             inverse = np.linalg.pinv(n, rcond=1e-8, hermitian=True)
@@ -178,29 +177,34 @@ class TypeSizes:
                 left.append((squares - part) / (redundancy - rank))
         return max(min(left), 1e-12)
 
-    def _places(self, names: Iterable[str]) -> NDArray[np.int_]:
-        """Places of the parameters of some effects."""
-        return np.concatenate([self.columns[name] for name in names])
-
     def of_set(self, names: Names) -> list[TypicalSet]:
         """Sizes and shares of a set that are most probable, for each scatter; none if none show."""
-        if not names or not {*names} <= {*self.columns}:
+        if not names or not {*names} <= {*self.specs}:
             return []
-        if names not in self._known:
-            starts = [dict.fromkeys(names, share) for share in SHARES]
-            if len(names) > 1:
-                alone = (most_likely(self.of_set((name,))).shares for name in names)
-                starts = [{key: share for one in alone for key, share in one.items()}]
-            first, *others = SCATTERS
-            best = most_likely([self._search(names, shares, first) for shares in starts])
-            rest = [self._search(names, best.shares, scatter, best.mean) for scatter in others]
-            self._known[names] = [best, *rest]
-        return self._known[names]
+        if len(names) == 1:
+            return self._singles[names[0]]
+        alone = (most_likely(self.of_set((name,))).shares for name in names)
+        return self._search_all(
+            names, [{key: share for one in alone for key, share in one.items()}]
+        )
+
+    @cached_property
+    def _singles(self) -> dict[str, list[TypicalSet]]:
+        """Sizes and shares of each effect by itself."""
+        return {n: self._search_all((n,), [{n: share} for share in SHARES]) for n in self.specs}
+
+    def _search_all(self, names: Names, starts: Sequence[Mapping[str, float]]) -> list[TypicalSet]:
+        """Search with each scatter, with the first one from some shares."""
+        first, *others = SCATTERS
+        best = most_likely([self._search(names, shares, first) for shares in starts])
+        return [best, *(self._search(names, best.shares, τ, best.mean) for τ in others)]
 
     def _search(
         self, names: Names, shares: Mapping[str, float], scatter: float, mean: Array | None = None
     ) -> TypicalSet:
         """Search for sizes and shares with a scatter, by expectation and maximization.
+
+        All is told for each subset s of the effects: what these have no part in is zero.
 
         Parameters
         ----------
@@ -209,55 +213,51 @@ class TypeSizes:
         scatter : float, τ
         mean : (k,) array, sizes to begin with; by default as if these shares of all have them
         """
-        at, usual = self._places(names), self.usual
-        normal, right = self.normal[:, at[:, None], at], self.right[:, at]
-        of = np.repeat(names, [len(self.columns[name]) for name in names])
-        subsets = [s for r in (1, 2) for s in combinations(names, r)]
-        places = [np.flatnonzero(np.isin(of, subset)) for subset in subsets]
-        has = np.array([[name in subset for name in names] for subset in ((), *subsets)])
+        at, usual = np.flatnonzero(np.isin(self.effects, names)), self.usual
+        of = self.effects[at] == np.array(names)[:, None]  # (e, k)
+        has = np.array([[name in some for name in names] for some in subsets_of(names)])
+        seen = has @ of  # (s, k)
+        normal = self.normal[:, at[:, None], at] * (seen[:, None, :, None] & seen[:, None, None])
+        right = self.right[:, at] * seen[:, None]
         rho = np.array([shares[name] for name in names])
         if mean is None:
-            whole, pulled = (a[usual].sum(axis=0) for a in (normal, right))
-            mean = _solved(whole, pulled) / np.array([shares[name] for name in of])
-        before, odds = -np.inf, np.zeros((len(has), len(right)))
+            whole, pulled = (a[-1, usual].sum(axis=0) for a in (normal, right))
+            mean = _solved(whole, pulled) / (rho @ of)
+        before = -np.inf
         for _ in range(MAX_STEPS):
-            squares = {name: float(np.mean(mean[of == name] ** 2)) for name in names}
-            variances = np.array([scatter**2 * squares[name] for name in of])
-            taken, seen = [], []
-            for row, some in enumerate(places, start=1):
-                n, b = normal[:, some[:, None], some], right[:, some]
-                m, s = mean[some], variances[some]
-                beside = np.eye(len(some)) + n * s  # I + N S
-                spread = s[:, None] * np.linalg.inv(beside)  # (S⁻¹ + N)⁻¹
-                lost, rest = n @ spread, b - n @ m
-                odds[row] = (
-                    (b + rest) @ m
-                    + np.einsum("nk,nkl,nl->n", rest, spread, rest)
-                    - np.linalg.slogdet(beside)[1]
-                ) / 2
-                # Weighted least squares: (N⁻¹ + S)⁻¹ = N − N (S⁻¹ + N)⁻¹ N.
-                taken.append((n - lost @ n)[usual])
-                seen.append((b - np.einsum("nkl,nl->nk", lost, b))[usual])
+            variances = scatter**2 * (of @ mean**2 / of.sum(axis=1)) @ of
+            beside = np.eye(len(at)) + normal * variances  # I + N S
+            spread = variances[:, None] * np.linalg.inv(beside)  # (S⁻¹ + N)⁻¹
+            lost, rest = normal @ spread, right - normal @ mean
+            odds = (
+                (right + rest) @ mean
+                + np.einsum("snk,snkl,snl->sn", rest, spread, rest)
+                - np.linalg.slogdet(beside)[1]
+            ) / 2
             prior = np.where(has, np.log(rho), np.log1p(-rho)).sum(axis=1)
             logs = odds + prior[:, None]
             total = np.logaddexp.reduce(logs)
+            # Weighted least squares: (N⁻¹ + S)⁻¹ = N − N (S⁻¹ + N)⁻¹ N.
+            taken = normal - lost @ normal
             if (now := float(total[usual].sum())) < before + LIKELIHOOD_TOLERANCE:
                 break
             before = now
-            weights = np.exp(logs[1:] - total)[:, usual]
-            whole, pulled = np.zeros((len(mean),) * 2), np.zeros(len(mean))
-            for some, w, a, b in zip(places, weights, taken, seen, strict=True):
-                whole[np.ix_(some, some)] += np.einsum("n,nkl->kl", w, a)
-                pulled[some] += w @ b
-            rho = np.clip(weights.sum(axis=1) @ has[1:] / weights.shape[1], 0.01, 0.999)
-            mean = _solved(whole, pulled)
-        # Sets of one are the first ones.
+            weights = np.exp(logs - total)[:, usual]
+            whole = np.einsum("sn,snkl->kl", weights, taken[:, usual])
+            b = right - np.einsum("snkl,snl->snk", lost, right)
+            rho = np.clip(weights.mean(axis=1) @ has, 0.01, 0.999)
+            mean = _solved(whole, np.einsum("sn,snk->k", weights, b[:, usual]))
         cost = 0.0
-        for share, some, a in zip(rho, places, taken, strict=False):
-            shown = share * mean[some] @ a.sum(axis=0) @ mean[some]
-            cost += _cost_of_fitting(len(some), float(shown))
-        known = dict(zip(((), *subsets), odds, strict=True))
-        return TypicalSet(known, before, cost, mean, dict(zip(names, rho.tolist(), strict=True)))
+        for k, share in enumerate(rho.tolist(), start=1):  # sets of one come behind the empty one
+            shown = share * mean @ taken[k, usual].sum(axis=0) @ mean
+            cost += _cost_of_fitting(int(seen[k].sum()), float(shown))
+        return TypicalSet(odds, before, cost, mean, dict(zip(names, rho.tolist(), strict=True)))
+
+
+def subsets_of(effects: Iterable[T]) -> list[tuple[T, ...]]:
+    """Subsets of some effects, all of which a sensor may have: none, and each alone, first."""
+    given = [*effects]
+    return [s for r in range(len(given) + 1) for s in combinations(given, r)]
 
 
 def most_likely(sets: Sequence[TypicalSet]) -> TypicalSet:

@@ -10,7 +10,7 @@ import accelstudy as acs
 from accelstudy.approaches import get_approach
 from accelstudy.diagnosis.evidence.size import Level
 from accelstudy.diagnosis.rules import RULES
-from accelstudy.lots.evidence import NO_MEAN, Sensor, weigh_mean
+from accelstudy.lots.evidence import Sensor, pose_mean, unknown_odds
 from accelstudy.lots.noise import Agreement, noises_of_lot
 from accelstudy.sensors.models import get_model
 
@@ -116,14 +116,15 @@ def test_the_mean_of_a_lot_shows_what_all_sensors_have():
         return [Sensor(c, get_model("bias-scale-nonorthogonality"), get_approach("robot"), i)
                 for i, c in enumerate(campaigns)]  # fmt: skip
 
-    def weighed(sensors):
-        return weigh_mean(sensors, [sensor.evidence() for sensor in sensors])
+    def posed(sensors):
+        return pose_mean(sensors, [sensor.evidence() for sensor in sensors])
 
-    assert weighed(lot(())).p_value > 0.01
+    assert posed(lot(())).detection.p_value > 0.01
     small = lot(("thermal_bias: 1e-4, -1e-4, 1e-4",))
-    mean = weighed(small)
-    assert mean.p_value < 1e-3
-    assert max(mean.odds, key=mean.odds.get) == "unknown(temperature → bias)"
+    mean = posed(small)
+    assert mean.detection.p_value < 1e-3
+    odds = unknown_odds(mean, 0.0)
+    assert max(odds, key=odds.get) == "unknown(temperature → bias)"
     # There is none of sensors in different positions.
     turned = [replace(one, campaign=one.campaign.with_arrays(time=None)) for one in small[:1]]
-    assert weighed([*turned, *small[1:3]]) == NO_MEAN
+    assert posed([*turned, *small[1:3]]) is None

@@ -27,10 +27,8 @@ def test_a_campaign_that_does_not_determine_the_model_says_nothing():
     sensor = Sensor(campaign, None, get_approach("gravity"))
     silent = sensor.evidence()
     assert (silent.odds, silent.tested) == ({}, {})
-    assert Derivatives.of(silent.solution, ("thermal_bias",)).columns["thermal_bias"].shape == (
-        0,
-        3,
-    )
+    nothing = Derivatives.of(silent.frame, ("thermal_bias",))
+    assert nothing.columns["thermal_bias"].shape == (0, 3)
 
 
 def over_sensors(values, sigmas, odd=()):
