@@ -35,10 +35,10 @@ LEVEL = 0.05
 """Level of the test, and of the search for what changed as a whole."""
 POINTS = 10
 """Binary logarithm of the number of variances that are tried for each estimated one."""
-MIN_PROBABILITY = 1e-300
-"""Least probability of which the logarithm is taken."""
-FREEDOM_TOLERANCE = 1e-7
-"""Relative error of ν and of the quantile that it follows from."""
+LIMIT_TOLERANCE = 1e-9
+"""Relative error of the quantile from which ν follows."""
+MANY = 1e9
+"""Degrees of freedom from which on they are infinite."""
 STATISTIC_TOLERANCE = 1e-9
 """Relative difference below which two statistics are equal, and the first one is taken."""
 
@@ -51,16 +51,18 @@ class Test(NamedTuple):
     statistic : float, weighted squares / f
     dof : (f, ν), of F; ν is infinite with stated noise
     p_value : float
+    level : float
     """
 
     statistic: float
     dof: tuple[int, float]
     p_value: float
+    level: float = LEVEL
 
     @property
     def congruent(self) -> bool:
         """Whether the epochs are compatible with no change."""
-        return self.p_value >= LEVEL
+        return self.p_value >= self.level
 
 
 @dataclass(frozen=True)
@@ -178,26 +180,17 @@ def dof_of_squares(means: Array, products: Array, dof: Array, level: float = LEV
     f, mean = float(np.sum(means)), inverse @ means
     scale = np.einsum("nk,kl,nl->n", inverse, products, inverse) / mean
 
-    def too_often(log: float) -> float:
-        """Log of the probability beyond a limit, in parts of the level."""
-        beyond = np.mean(special.gammaincc(mean / scale / 2, np.exp(log) / scale / 2))
-        return float(np.log(max(beyond, MIN_PROBABILITY) / level))
+    shape = mean / scale / 2
+    quantiles = 2 * scale * special.gammainccinv(shape, level)
 
-    least = float(np.log(stats.chi2.isf(level, f)))
-    if too_often(least) <= 0:
-        return np.inf
-    most = least + 1
-    while too_often(most) > 0:
-        most += 2 * (most - least)
-    limit = np.exp(optimize.brentq(too_often, least, most, xtol=FREEDOM_TOLERANCE)) / f
+    def too_often(limit: float) -> float:
+        """Probability beyond a limit, less the level."""
+        return float(np.mean(special.gammaincc(shape, limit / scale / 2))) - level
 
-    def beyond_that(log: float) -> float:
-        return float(np.log(special.fdtri(f, np.exp(log), 1 - level) / limit))
-
-    fewest, many = np.log([max(0.1, min(dof) / 4), 1e9])
-    if beyond_that(many) > 0:
-        return np.inf
-    return float(np.exp(optimize.brentq(beyond_that, fewest, many, xtol=FREEDOM_TOLERANCE)))
+    ends = float(quantiles.min()), float(quantiles.max())
+    limit = optimize.brentq(too_often, *ends, rtol=LIMIT_TOLERANCE) / f
+    nu = float(special.fdtridfd(f, 1 - level, limit))
+    return nu if nu < MANY else np.inf
 
 
 @cache

@@ -40,7 +40,7 @@ class Rate(NamedTuple):
     dof: int
 
     @property
-    def interval(self) -> tuple[float, float]:
+    def ci95(self) -> tuple[float, float]:
         """Interval that holds the rate with a probability of 95 %."""
         half = sigmas_95(self.dof) * self.sigma
         return self.per_year - half, self.per_year + half
@@ -49,6 +49,21 @@ class Rate(NamedTuple):
     def p_value(self) -> float:
         """Probability of a larger estimate where there is no rate."""
         return 2 * float(stats.t.sf(abs(self.per_year) / self.sigma, self.dof))
+
+
+class Scatter(NamedTuple):
+    """Scatter from session to session.
+
+    Attributes
+    ----------
+    sd : float
+    ci95 : tuple of two floats, its 95 % interval
+    p_value : float, probability that noise alone leaves such squares about the line
+    """
+
+    sd: float
+    ci95: tuple[float, float]
+    p_value: float
 
 
 @dataclass(frozen=True, eq=False)
@@ -60,12 +75,14 @@ class ParameterCourse:
     years : (n,) array, time
     values, variances : (n,) arrays, of the calibrations
     dof : (n,) array, degrees of freedom of the variances; inf if the noise was stated
+    level : float, of what is found, and at which the test of the scatter is exact
     """
 
     years: Array
     values: Array
     variances: Array
     dof: Array
+    level: float = LEVEL
 
     @cached_property
     def line(self) -> RandomEffects:
@@ -79,15 +96,18 @@ class ParameterCourse:
         variance = self.line.covariance[1, 1]
         return Rate(float(self.line.estimates[1]), float(np.sqrt(variance)), self.line.dof)
 
-    def p_value_of_scatter(self, level: float = LEVEL) -> float:
-        """Probability that noise alone leaves such squares about the line; exact at some level."""
+    @cached_property
+    def scatter(self) -> Scatter:
+        """Scatter about the line."""
         line, root = self.line, np.sqrt(self.variances)
         smooth = line.design @ line.combination(0.0) * root / root[:, None]
         left = np.eye(len(root)) - smooth
-        nu = dof_of_squares(np.diag(left), left**2, self.dof, level)
-        return f_tail(line.squares(0.0) / line.dof, line.dof, nu)
+        nu = dof_of_squares(np.diag(left), left**2, self.dof, self.level)
+        p_value = f_tail(line.squares(0.0) / line.dof, line.dof, nu)
+        return Scatter(line.scatter, line.scatter_interval(), p_value)
 
-    def found(self, level: float) -> tuple[str, ...]:
-        """What a parameter that changed does, at some level; "changed" if that is not sure."""
-        named = {"drifts": self.rate.p_value, "scatters": self.p_value_of_scatter(level)}
-        return tuple(word for word, p in named.items() if p <= level) or ("changed",)
+    @property
+    def found(self) -> tuple[str, ...]:
+        """What a parameter that changed does, in words; "changed" if that is not sure."""
+        named = {"drifts": self.rate.p_value, "scatters": self.scatter.p_value}
+        return tuple(word for word, p in named.items() if p <= self.level) or ("changed",)

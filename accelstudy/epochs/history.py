@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Sequence
 from datetime import datetime
 from functools import cached_property
+from itertools import zip_longest
 from pathlib import Path
 from typing import Any
 
@@ -21,9 +22,9 @@ from accelstudy.basics.wording import comma_list, estimate, plural
 from accelstudy.campaign.calibration.sensor_calibration import SensorCalibration
 from accelstudy.drawing.saving import save_all
 from accelstudy.drawing.style import FULL, INK, group_colour, group_of, new_figure, symbol
-from accelstudy.epochs.congruence import LEVEL, Congruence
+from accelstudy.epochs.congruence import LEVEL, Congruence, Test
 from accelstudy.epochs.course import YEAR, ParameterCourse
-from accelstudy.epochs.file_format import HistoryDocument
+from accelstudy.epochs.file_format import Calibration, HistoryDocument, Parameter, Tilt
 from accelstudy.epochs.interval import Interval
 from accelstudy.files.outputs import HISTORY
 from accelstudy.leveling.error import ATTITUDES, TiltError, cap_forces, tilt_error
@@ -32,8 +33,6 @@ from accelstudy.pages.result import Result
 
 Array = NDArray[np.float64]
 
-STATES = {True: "unchanged", False: "changed"}
-"""States of a result by whether the calibrations agree."""
 MIN_COURSE = 3
 """Calibrations of which a line leaves a degree of freedom."""
 MIN_DIFFERENCE = 1e-12
@@ -51,7 +50,7 @@ class History(Result):
 
     Attributes
     ----------
-    calibrations : tuple of n SensorCalibration, in the order of time
+    sessions : tuple of n SensorCalibration, in the order of time
     model : SensorModel
     estimates : (n, p) array, SI
     covariances : (n, p, p) array
@@ -62,10 +61,9 @@ class History(Result):
     courses : tuple of p accelstudy.epochs.course.ParameterCourse; empty for two calibrations
     interval : accelstudy.epochs.interval.Interval, how long the last calibration stays good enough;
         None if no accuracy was given
-    sensor : str, what was calibrated; None if no campaign says it
     """
 
-    kind = HISTORY
+    kind, document = HISTORY, HistoryDocument
     size = FULL, 70.0
 
     def __init__(
@@ -95,33 +93,39 @@ class History(Result):
         if dates and len(set(dates)) < 2 and n >= MIN_COURSE:
             raise InputError(f"{key('dates')}: all are the same; a rate needs two dates or more")
         order = sorted(range(n), key=dates.__getitem__) if dates else range(n)
-        self.calibrations = tuple(calibrations[i] for i in order)
+        self.sessions = tuple(calibrations[i] for i in order)
         self.dates = tuple(dates[i] for i in order) if dates else ()
-        _check_alike(self.calibrations)
-        self.model, self.tilt_range = self.calibrations[0].model, tilt_range
-        self.parameters, names = self.model.parameters, self.model.parameter_names
-        self.estimates, self.covariances = (
-            np.zeros((n, len(names))),
-            np.zeros((n, *[len(names)] * 2)),
-        )
-        for i, one in enumerate(self.calibrations):
-            places = [one.model.parameter_names.index(name) for name in names]
-            self.estimates[i] = one.parameters[places]
-            self.covariances[i] = one.covariance[np.ix_(places, places)]
+        _check_alike(self.sessions)
+        self.model, self.tilt_range = self.sessions[0].model, tilt_range
+        names = self.model.parameter_names
+        places = [[one.model.parameter_names.index(x) for x in names] for one in self.sessions]
+        each = [*zip(self.sessions, places, strict=True)]
+        self.estimates = np.array([one.parameters[at] for one, at in each])
+        self.covariances = np.array([one.covariance[np.ix_(at, at)] for one, at in each])
         self.sigmas = np.sqrt(np.diagonal(self.covariances, axis1=1, axis2=2))
-        dof = np.array([one.dof for one in self.calibrations])
-        self.change = Congruence(self.estimates, self.covariances, dof)
-        self.courses: tuple[ParameterCourse, ...] = ()
-        if n >= MIN_COURSE:
-            each = zip(self.estimates.T, np.square(self.sigmas).T, strict=True)
-            self.courses = tuple(ParameterCourse(self.years, *one, dof) for one in each)
-        self.interval = None
-        if accuracy is not None:
-            self.interval = Interval(self, accuracy, confidence)
-        sensors = (one.content["sensor"] for one in self.calibrations)
-        self.sensor: str | None = next(filter(None, sensors), None)
-        campaigns = " and ".join(one.content["campaign"] for one in self.calibrations)
-        self.name = campaigns if n == 2 else self.sensor or self.calibrations[0].content["campaign"]
+        self.interval = None if accuracy is None else Interval(self, accuracy, confidence)
+
+    @property
+    def name(self) -> str:  # type: ignore[override]
+        """What the calibrations are of: two campaigns, or a sensor over time."""
+        campaigns = [one.campaign for one in self.calibrations]
+        return " and ".join(campaigns) if len(campaigns) == 2 else self.sensor or campaigns[0]
+
+    @property
+    def sensor(self) -> str | None:
+        """What was calibrated; None if no campaign says it."""
+        return next((x for one in self.sessions if (x := one.content["sensor"])), None)
+
+    @property
+    def effects(self) -> list[str]:
+        """Effects that all calibrations have."""
+        return [effect.spec for effect in self.model.effects]
+
+    @cached_property
+    def calibrations(self) -> list[Calibration]:
+        """Campaigns with their dates, in the order of time."""
+        each = zip_longest(self.sessions, (date.isoformat() for date in self.dates))
+        return [Calibration(campaign=one.content["campaign"], date=date) for one, date in each]
 
     @property
     def years(self) -> Array:
@@ -131,28 +135,47 @@ class History(Result):
         return np.array([(date - self.dates[-1]).total_seconds() / YEAR for date in self.dates])
 
     @cached_property
-    def found(self) -> tuple[tuple[str, ...], ...]:
-        """What each parameter does over time, in words: nothing, if it did not change.
+    def change(self) -> Congruence:
+        """Congruence of all parameters."""
+        return Congruence(self.estimates, self.covariances, self._dof)
+
+    @property
+    def _dof(self) -> Array:
+        """Degrees of freedom of the covariance matrices, (n,)."""
+        return np.array([one.dof for one in self.sessions])
+
+    @property
+    def test(self) -> Test:
+        """Congruence test of all parameters."""
+        return self.change.test
+
+    @property
+    def state(self) -> str:
+        """Whether anything changed."""
+        return "unchanged" if self.test.congruent else "changed"
+
+    @cached_property
+    def courses(self) -> list[ParameterCourse]:
+        """Each parameter over time; none of two calibrations.
 
         Of two tests of each parameter that changed one may fail by chance, for a drift or a
         scatter, of which one is there: so all of them together have the level of one.
         """
-        changed, p = self.change.fewest_changes, len(self.parameters)
-        if not self.courses:
-            return tuple(("changed",) if k in changed else () for k in range(p))
-        return tuple(
-            course.found(LEVEL / p) if k in changed else () for k, course in enumerate(self.courses)
-        )
+        if len(self.sessions) < MIN_COURSE:
+            return []
+        level = LEVEL / self.model.n_parameters
+        each = zip(self.estimates.T, np.square(self.sigmas).T, strict=True)
+        return [ParameterCourse(self.years, *one, self._dof, level) for one in each]
 
     def tilt_error(self, first: Array, second: Array) -> TiltError:
         """Tilt error by one set of parameters for another, in conditions of the last session."""
-        last = self.calibrations[-1]
+        last = self.sessions[-1]
         forces = cap_forces(self.tilt_range, ATTITUDES, last.gravity)
         forces, hold = last.with_conditions(forces, self.model.hold_columns)
         return tilt_error(self.model, first, self.model, second, forces, last.gravity, hold)
 
     @cached_property
-    def tilt(self) -> Array:
+    def tilts(self) -> Array:
         """Rms by which roll and pitch differ, and that which chance would give, (2, 2), rad.
 
         Readings are those of the sensor as it was at first; they are leveled as if it had not
@@ -164,105 +187,76 @@ class History(Result):
         plain = np.where(error.constant > MIN_DIFFERENCE**2, error.constant, 0.0)
         return np.sqrt([plain, by_chance])
 
+    @property
+    def tilt(self) -> Tilt:
+        """Tilts, and the range that they are taken over."""
+        names = ("roll_mgon", "pitch_mgon", "roll_by_chance_mgon", "pitch_by_chance_mgon")
+        tilts = dict(zip(names, (self.tilts / MGON).ravel().tolist(), strict=True))
+        return Tilt(**tilts, max_tilt_gon=self.tilt_range / GON)
+
     @cached_property
-    def rows(self) -> list[dict[str, Any]]:
-        """What history.json has of each parameter."""
-        changes = self.estimates[-1] - self.estimates[0]
+    def parameters(self) -> list[Parameter]:
+        """What each parameter does over time: nothing is found of one that did not change."""
         steady = 1 - self.years / self.years[0] if self.years[0] else np.array([0.0, 1.0])
-        detectable, names = self.change.detectable(steady), self.model.parameter_names
-        rows = []
-        for k, parameter in enumerate(self.parameters):
-            instead = self.change.instead_of(k) if self.found[k] else ()
-            row = {
+        detectable, changed = self.change.detectable(steady), self.change.fewest_changes
+        names, table = self.model.parameter_names, list[Parameter]()
+        for k, parameter in enumerate(self.model.parameters):
+            course = self.courses[k] if self.courses else None
+            values, sigmas = self.estimates[:, k], self.sigmas[:, k]
+            found, instead = tuple[str, ...](), tuple[int, ...]()
+            if k in changed:
+                found, instead = course.found if course else ("changed",), self.change.instead_of(k)
+            entry = {
                 "name": parameter.name,
                 "unit": parameter.unit,
-                "values": self.estimates[:, k],
-                "sigmas": self.sigmas[:, k],
-                "change": changes[k],
-                "sigma": np.hypot(*self.sigmas[[0, -1], k]),
+                "values": values.tolist(),
+                "sigmas": sigmas.tolist(),
+                "change": values[-1] - values[0],
+                "sigma": np.hypot(sigmas[0], sigmas[-1]),
                 "detectable": detectable[k],
-                "found": self.found[k],
+                "found": found,
                 "or": [names[i] for i in instead],
-                "rate": None,
-                "scatter": None,
+                "rate": course and course.rate,
+                "scatter": course and course.scatter,
             }
-            if self.courses:
-                course = self.courses[k]
-                row["rate"] = {
-                    "per_year": course.rate.per_year,
-                    "sigma": course.rate.sigma,
-                    "ci95": course.rate.interval,
-                    "p_value": course.rate.p_value,
-                }
-                row["scatter"] = {
-                    "sd": course.line.scatter,
-                    "ci95": course.line.scatter_interval(),
-                    "p_value": course.p_value_of_scatter(LEVEL / len(self.parameters)),
-                }
-            rows.append(row)
-        return rows
+            table.append(Parameter.model_validate(entry))
+        return table
+
+    @cached_property
+    def verdict(self) -> str:
+        """What changed, drifts and scatters, and what it matters."""
+        return " ".join(self.sentences)
 
     @cached_property
     def sentences(self) -> list[str]:
-        """What changed, drifts and scatters, and what it matters; the verdict comes first."""
-        texts: dict[str, list[str]] = {"drifts": [], "scatters": [], "changed": []}
-        for k, row in enumerate(self.rows):
-            if "drifts" in row["found"]:
-                texts["drifts"].append(change_text(row, *self.courses[k].rate[:2]))
-            if "scatters" in row["found"]:
-                scatter = size_text(row["scatter"]["sd"], row["unit"])
-                texts["scatters"].append(f"{row['name']} by {scatter}")
-            if "changed" in row["found"]:
-                texts["changed"].append(change_text(row, row["change"], row["sigma"]))
-        largest = dict[str, dict[str, Any]]()
-        for row in sorted(self.rows, key=lambda row: row["detectable"]):
-            largest[row["unit"]] = row
-        least = [
-            f"{size_text(row['detectable'], row['unit'])} in {row['name']}"
-            for row in self.rows
-            if largest[row["unit"]] is row
-        ]
-        return render_lines("epochs/wording.txt.j2", "history", self, texts, least)
+        """The verdict, sentence by sentence."""
+        by_size = sorted(self.parameters, key=lambda one: one.detectable or 0.0)
+        largest = {one.unit: one for one in by_size}
 
-    @cached_property
-    def content(self) -> dict[str, Any]:
-        """Content of history.json, in SI but for keys that name another unit; per year."""
-        test = self.change.test
-        names = ("roll_mgon", "pitch_mgon", "roll_by_chance_mgon", "pitch_by_chance_mgon")
-        tilt = zip(names, (self.tilt / MGON).ravel().tolist(), strict=True)
-        dates = [date.isoformat() for date in self.dates]
-        return HistoryDocument.content({
-            "sensor": self.sensor,
-            "calibrations": [
-                {"campaign": one.content["campaign"], "date": dates[i] if dates else None}
-                for i, one in enumerate(self.calibrations)
+        def texts(word: str, text: Callable[[Any], str]) -> list[str]:
+            return [text(one) for one in self.parameters if word in one.found]
+
+        return render_lines(
+            "epochs/wording.txt.j2",
+            "history",
+            self,
+            drifts=texts("drifts", lambda p: change_text(p, p.rate.per_year, p.rate.sigma)),
+            scatters=texts("scatters", lambda p: f"{p.name} by {size_text(p.scatter.sd, p.unit)}"),
+            changed=texts("changed", lambda p: change_text(p, p.change, p.sigma)),
+            least=[
+                f"{size_text(p.detectable or 0.0, p.unit)} in {p.name}"
+                for p in self.parameters
+                if largest[p.unit] is p
             ],
-            "effects": [effect.spec for effect in self.model.effects],
-            "state": STATES[test.congruent],
-            "test": {**test._asdict(), "level": LEVEL},
-            "parameters": self.rows,
-            "tilt": {**dict(tilt), "max_tilt_gon": self.tilt_range / GON},
-            "interval": self.interval and self.interval.content,
-            "verdict": " ".join(self.sentences),
-        })  # fmt: skip
+        )
 
     def to_frame(self) -> pd.DataFrame:
         """Return the change of each parameter, its rate a year and scatter, and what was found."""
-        rows = pd.json_normalize([*self.content["parameters"]]).set_index("name")
+        rows = pd.json_normalize([one.model_dump() for one in self.parameters]).set_index("name")
         rows["found"] = rows["found"].str.join(", ")
-        rates = {
-            "rate.per_year": "rate_per_year",
-            "rate.sigma": "sigma_rate",
-            "scatter.sd": "scatter",
-        }
-        columns = [
-            "change",
-            "sigma",
-            "detectable",
-            *(rates if self.courses else ()),
-            "unit",
-            "found",
-        ]
+        names = {"rate.per_year": "rate_per_year", "rate.sigma": "sigma_rate"}
+        rates = {**names, "scatter.sd": "scatter"} if self.courses else {}
+        columns = ["change", "sigma", "detectable", *rates, "unit", "found"]
         return rows[columns].rename(columns=rates)
 
     def write(self, folder: Path, place: Path) -> None:
@@ -276,7 +270,7 @@ class History(Result):
             lines=self.sentences,
             figure=save_all({"history": self.figure}, folder / "figures")["history"],
         )
-        HistoryDocument.write(folder, self.content)
+        super().write(folder, place)
 
     @property
     def _times(self) -> NDArray[Any]:
@@ -308,8 +302,8 @@ class History(Result):
 
     def _draw_parameter(self, ax: Axes, k: int) -> None:
         """Draw the calibrations of a parameter, and its line."""
-        parameter, found = self.parameters[k], self.found[k]
-        unit, times = parameter.unit, self._times
+        parameter, times = self.parameters[k], self._times
+        unit, found = parameter.unit, parameter.found
         values, halves = (to_display(v[:, k], unit) for v in (self.estimates, 1.96 * self.sigmas))
         ax.errorbar(times, values, halves, fmt="o", color=INK, capsize=2, linewidth=0.8, ms=3)
         ax.set_title(symbol(parameter.name) + (f" ({' and '.join(found)})" if found else ""))
@@ -410,8 +404,8 @@ def size_text(size: float, unit: str) -> str:
     return f"{estimate(size, size, unit)[1]} {shown_unit(unit)}".strip()
 
 
-def change_text(row: Mapping[str, Any], value: float, sigma: float) -> str:
+def change_text(parameter: Parameter, value: float, sigma: float) -> str:
     """Name a parameter with its change, or its rate, and the sigma of that; in SI."""
-    shown, uncertain = estimate(value, sigma, row["unit"])
-    sign, unit = "" if shown.startswith("−") else "+", shown_unit(row["unit"])
-    return f"{row['name']} by {sign}{shown} ± {uncertain} {unit}".strip()
+    shown, uncertain = estimate(value, sigma, parameter.unit)
+    sign, unit = "" if shown.startswith("−") else "+", shown_unit(parameter.unit)
+    return f"{parameter.name} by {sign}{shown} ± {uncertain} {unit}".strip()

@@ -10,9 +10,9 @@ is estimated itself: the mean square of the tilt error has the degrees of freedo
 from __future__ import annotations
 
 from dataclasses import dataclass
-from datetime import datetime, timedelta
+from datetime import timedelta
 from functools import cached_property
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
@@ -56,9 +56,10 @@ class Interval:
         return float(np.sqrt(np.quantile(np.maximum(larger, 0.0), self.confidence)))
 
     @property
-    def until(self) -> datetime:
+    def until(self) -> str:
         """Date until which it stays good enough."""
-        return self.history.dates[-1] + timedelta(seconds=self.years * YEAR)
+        last = self.history.dates[-1] + timedelta(seconds=self.years * YEAR)
+        return last.date().isoformat()
 
     @cached_property
     def years(self) -> float:
@@ -76,16 +77,19 @@ class Interval:
         return float(optimize.brentq(beyond, first - steps[1], first))
 
     @property
-    def content(self) -> dict[str, Any]:
-        """What history.json says of it."""
-        return {
-            "years": self.years,
-            "until": self.until.date().isoformat(),
-            "accuracy_mgon": self.accuracy / MGON,
-            "max_tilt_gon": self.history.tilt_range / GON,
-            "confidence": self.confidence,
-            "errors": [{"years": t, "mgon": self.error(t) / MGON} for t in SHOWN_YEARS],
-        }
+    def accuracy_mgon(self) -> float:
+        """The accuracy in mgon."""
+        return self.accuracy / MGON
+
+    @property
+    def max_tilt_gon(self) -> float:
+        """Tilts that it is taken over."""
+        return self.history.tilt_range / GON
+
+    @property
+    def errors(self) -> list[dict[str, float]]:
+        """Errors over time."""
+        return [{"years": t, "mgon": self.error(t) / MGON} for t in SHOWN_YEARS]
 
     @cached_property
     def _squares(self) -> tuple[Array, Array, Array]:

@@ -33,7 +33,7 @@ def test_the_change_of_roll_and_pitch_is_that_of_readings():
     forces = cap_forces(50 * GON, 5000, second.gravity)
     readings = first.model.sense(forces, first.parameters)
     apart = wrap_angle(angles_of(second.correct(readings)) - angles_of(forces))
-    np.testing.assert_allclose(c.tilt[0], np.sqrt(np.mean(apart**2, axis=0)), rtol=0.01)
+    np.testing.assert_allclose(c.tilts[0], np.sqrt(np.mean(apart**2, axis=0)), rtol=0.01)
     assert [c.parameters[i].name for i in c.change.fewest_changes] == ["b_y"]
 
 

@@ -53,7 +53,7 @@ def test_what_is_not_there_is_found_no_more_often_than_is_said(sigmas, dof):
     sure = np.isinf(dof).all()
     n = 300 if sure else 60
     still = [change_of(c).test.p_value < LEVEL for c in drawn(1, sigmas, n=n, dof=dof)]
-    drifting = [c.p_value_of_scatter() < LEVEL for c in drawn(1, sigmas, n=n, dof=dof, rate=3.0)]
+    drifting = [c.scatter.p_value < LEVEL for c in drawn(1, sigmas, n=n, dof=dof, rate=3.0)]
     for found in (still, drifting):
         assert np.mean(found) <= LEVEL + tolerance(LEVEL, n)
         if sure:
@@ -64,7 +64,7 @@ def test_what_is_not_there_is_found_no_more_often_than_is_said(sigmas, dof):
 def test_intervals_hold_rate_and_scatter(sigmas, scatter):
     """Without scatter the interval of the rate is wider than it need be: nobody knows."""
     rates, scatters = zip(
-        *((c.rate.interval, c.line.scatter_interval())
+        *((c.rate.ci95, c.scatter.ci95)
           for c in drawn(2, sigmas, rate=0.4, scatter=scatter)), strict=True,
     )  # fmt: skip
     low, high = np.transpose(scatters)
@@ -92,7 +92,7 @@ def test_all_tests_have_one_level(true):
         values[:, :many] += 20 * shape[:, :many]
         changed = Congruence(values, covariances, STATED).fewest_changes
         variances = np.diagonal(covariances, axis1=1, axis2=2)
-        found = [{*ParameterCourse(DATES, values[:, k], variances[:, k], STATED).found(LEVEL / 9)}
+        found = [{*ParameterCourse(DATES, values[:, k], variances[:, k], STATED, LEVEL / 9).found}
                  for k in changed]  # fmt: skip
         wrong += any(f - right for f in found) or any(k >= many for k in changed)
     assert wrong / n <= LEVEL + tolerance(LEVEL, n)
