@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from accelstudy.approaches import Approach
-from accelstudy.basics.wording import words
+from accelstudy.basics.wording import comma_list, words
 from accelstudy.campaign.session import Campaign
 from accelstudy.diagnosis.decision.problem import BaseFit, Problem, fit_base, pose
 from accelstudy.diagnosis.evidence.candidates import UNKNOWN
@@ -25,6 +25,8 @@ from accelstudy.sensors.sensor import SensorModel
 
 Array = NDArray[np.float64]
 
+NAMELESS = "something without a name "
+"""What is unknown, in words."""
 COLUMNS = ("angles", "yaw", "time", "temperature", "vibration")
 """What a position has beside its forces."""
 MAX_CONDITION_DIFFERENCE = 0.2
@@ -259,8 +261,6 @@ def _same(sensors: Iterable[SensorEvidence], one: str, other: str) -> bool:
     return 2 * alike > len(shown)
 
 
-def name_words(name: str) -> str:
-    """Name of an effect, or of something unknown, in words."""
-    if not name.startswith(UNKNOWN):
-        return words(name)
-    return f"something without a name {name.removeprefix(UNKNOWN)}"
+def either(names: Sequence[str]) -> str:
+    """Names that mean the same, or something without a name, in words."""
+    return comma_list([words(name).replace(UNKNOWN, NAMELESS, 1) for name in names], "or")

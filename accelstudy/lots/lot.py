@@ -194,11 +194,11 @@ def _own(whole: SensorModel, passes: Sequence[Pass], i: int) -> SensorModel:
 def _explained(passes: Sequence[Pass], whole: SensorModel, known: int, mapped: Mapped) -> bool:
     """Whether what was found explains the lot, with the most probable of what is not sure."""
     now = passes[-1]
-    while (rest := now.without_odd()).p_value < LEVEL_OF_REST:
-        best = next(iter(rest.given))
-        if best in NOISES or {effect.name for effect in whole.effects} & {*rest.classes[best]}:
+    while now.p_value_of_usual < LEVEL_OF_REST:
+        best = next(iter(now.given))
+        if best in NOISES or {effect.name for effect in whole.effects} & {*now.classes[best]}:
             return True
-        spec = rest.spec(best)
+        spec = now.spec(best)
         if spec is None or known >= MAX_PASSES:
             return False
         whole, known = extended(whole, [spec]), known + 1

@@ -4,9 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from contextlib import suppress
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from functools import cached_property
-from itertools import count
 from pathlib import Path
 from typing import Any
 
@@ -22,7 +21,7 @@ from accelstudy.basics.errors import InputError
 from accelstudy.basics.names import path_name
 from accelstudy.basics.progress import say, show
 from accelstudy.basics.units import GON, MGON, shown_unit, to_display
-from accelstudy.basics.wording import comma_list, probability
+from accelstudy.basics.wording import probability
 from accelstudy.campaign.calibration.assessment import tilt_left
 from accelstudy.campaign.calibration.figures import SUSPECT
 from accelstudy.campaign.calibration.file_format import CalibrationDocument
@@ -55,7 +54,7 @@ from accelstudy.leveling.error import (
     holds_in_use,
     tilt_error,
 )
-from accelstudy.lots.evidence import name_words
+from accelstudy.lots.evidence import either
 from accelstudy.lots.file_format import LotDocument
 from accelstudy.lots.lot import LotDiagnosis, weigh_lot
 from accelstudy.lots.passes import LEVEL, LotEffect
@@ -73,6 +72,7 @@ MIN_SENSORS = 2
 """Sensors of the smallest lot."""
 
 
+@dataclass(frozen=True, eq=False, repr=False)
 class Lot(Result):
     """What the model of sensors of one type lacks, and a calibration of each of them.
 
@@ -84,17 +84,17 @@ class Lot(Result):
     left_out : mapping of campaigns that are not in the lot to why
     """
 
-    kind = LOT
+    kind, document = LOT, LotDocument
 
-    def __init__(
-        self,
-        diagnosis: LotDiagnosis,
-        model: SensorModel,
-        fits: Sequence[CampaignFit | InputError],
-        left_out: Mapping[str, str],
-    ) -> None:
-        self.diagnosis, self.model, self.fits, self.left_out = diagnosis, model, fits, left_out
-        self.name = f"{len(diagnosis.last.sensors)} sensors"
+    diagnosis: LotDiagnosis
+    model: SensorModel
+    fits: Sequence[CampaignFit | InputError]
+    left_out: Mapping[str, str]
+
+    @property
+    def name(self) -> str:  # type: ignore[override]
+        """How many sensors there are."""
+        return f"{len(self.fits)} sensors"
 
     @classmethod
     def of(
@@ -119,18 +119,19 @@ class Lot(Result):
             If fewer than two campaigns can be judged.
         """
         usable, without, first = list[Campaign](), dict[str, str](), dict[bytes, str]()
-        names = own_names([campaign.name for campaign in campaigns])
-        for given, name in zip(campaigns, names, strict=True):
-            campaign = given.with_header(name=name)
+        names = [campaign.name for campaign in campaigns]
+        for number, (given, name) in enumerate(zip(campaigns, names, strict=True), start=1):
+            own = name if names.count(name) == 1 else f"{name} ({number})"
+            campaign = given.with_header(name=own)
             # Noise never repeats: the same numbers are the same log, whatever its folder.
-            if (same := first.setdefault(campaign.forces.tobytes(), name)) != name:
-                without[name] = f"{name}: has the readings of {same}; each sensor counts once"
+            if (same := first.setdefault(campaign.forces.tobytes(), own)) != own:
+                without[own] = f"{own}: has the readings of {same}; each sensor counts once"
                 continue
             try:
                 fit_base(campaign, model, approach or usual_approach(campaign))
                 usable.append(campaign)
             except InputError as error:
-                without[name] = str(error)
+                without[own] = str(error)
         if len(usable) < MIN_SENSORS:
             why = next(iter(without.values()), "")
             raise InputError(why or "CAMPAIGN: a lot has two sensors or more; `diagnose` takes one")
@@ -171,18 +172,22 @@ class Lot(Result):
         for i, fit in self.fitted.items():
             values[i], sigmas[i] = fit.parameters, np.sqrt(self._variances(i, fit))
         usual = np.isin(np.arange(n), diagnosis.last.usual)
-        has = dict.fromkeys(model.parameter_names, np.ones(n, dtype=bool))
-        for found in diagnosis.effects:
-            having = np.array([found.names[0] in one.names for one in each])
-            has |= dict.fromkeys(_parameters_of(found.spec), having)
-        return {
-            p.name: TypeParameter(p.name, p.unit, values[:, j], sigmas[:, j], usual, has[p.name])
-            for j, p in enumerate(model.parameters)
+        having = {
+            name: np.array([found.names[0] in one.names for one in each])
+            for found in diagnosis.effects
+            for name in _parameters_of(found)
         }
+        return {
+            p.name: TypeParameter(
+                p.name, p.unit, stays, values[:, j], sigmas[:, j], usual,
+                having.get(p.name, np.ones(n, dtype=bool)),
+            )
+            for j, (p, stays) in enumerate(zip(model.parameters, model.stays.tolist(), strict=True))
+        }  # fmt: skip
 
     def _sizes(self, found: LotEffect) -> list[TypeParameter]:
         """Parameters of an effect that was found."""
-        return [self.parameters[name] for name in _parameters_of(found.spec)]
+        return [self.parameters[name] for name in _parameters_of(found)]
 
     def _variances(self, i: int, fit: CampaignFit) -> Array:
         """Variances of the parameters of a sensor, (u,), by what all sensors tell of its noise.
@@ -226,11 +231,9 @@ class Lot(Result):
             "verdict",
             self,
             d,
-            lambda names: comma_list([*map(name_words, names)], "or"),
-            closest=[_either(names[:3]) for names in d.close],
-            alternatives=[
-                f"{_either(names[:3])} ({probability(p)})" for names, p in d.alternatives
-            ],
+            either,
+            closest=[either(names[:3]) for names in d.close],
+            alternatives=[f"{either(names[:3])} ({probability(p)})" for names, p in d.alternatives],
             alone=sum(one.p_value < LEVEL for one in d.evidence),
             single=sum(max(one.odds, key=one.odds.__getitem__) in first for one in d.evidence),
             max_tilt=MAX_TILT_GON * GON,
@@ -244,14 +247,13 @@ class Lot(Result):
             "sensors": len(d.last.sensors),
             "anything": {"p_value": d.p_value, "missing": d.missing, "level": LEVEL},
             "effects": [
-                {**found._asdict(), "parameters": [one.content for one in self._sizes(found)]}
-                for found in d.effects
+                {**found._asdict(), "parameters": self._sizes(found)} for found in d.effects
             ],
             "explained": d.explained,
             "close": d.close,
             "alternatives": [{"names": n, "posterior": p} for n, p in d.alternatives],
             "odd": [
-                {**one._asdict(), "reason": f"it shows {_either(one.names)}, and the others do not"}
+                {**one._asdict(), "reason": f"it shows {either(one.names)}, and the others do not"}
                 for one in d.last.odd
             ],
             "each": [
@@ -304,7 +306,7 @@ class Lot(Result):
             doc=self.content,
             state=self.state,
             lines=self.sentences,
-            either=_either,
+            either=either,
             figures=save_all({"sensors": self.figure}, folder / "figures"),
             next_steps=steps,
         )
@@ -335,25 +337,9 @@ class Lot(Result):
         return figure
 
 
-def own_names(given: Sequence[str]) -> list[str]:
-    """Return names of campaigns, no two alike: of equal ones each gets a number behind it."""
-    names: list[str] = []
-    for number, name in enumerate(given, start=1):
-        if given.count(name) > 1:
-            numbered = (f"{name} ({k})" for k in count(number))
-            name = next(one for one in numbered if one not in {*given, *names})
-        names.append(name)
-    return names
-
-
-def _either(names: Sequence[str]) -> str:
-    """Names that mean the same, in words."""
-    return " or ".join(map(name_words, names))
-
-
-def _parameters_of(spec: str | None) -> Sequence[str]:
-    """Names of the parameters of an effect; none of what is no effect."""
-    return () if spec is None else compose(spec, (spec,)).parameter_names
+def _parameters_of(found: LotEffect) -> Sequence[str]:
+    """Names of the parameters of what was found; none of what is no effect."""
+    return () if found.spec is None else compose(found.spec, (found.spec,)).parameter_names
 
 
 def _squared_error(fit: CampaignFit, model: SensorModel) -> Array:

@@ -174,12 +174,17 @@ class Pass:
 
     @cached_property
     def p_value(self) -> float:
-        """Probability that sensors without anything missing would show as much evidence.
+        """Probability that sensors without anything missing would show as much evidence."""
+        return self._p_value(self.evidence)
 
-        It is that of the sensors or of their mean, if they have one, whichever is the smaller one,
-        for both.
-        """
-        each = p_value([one.tested for one in self.evidence], {UNKNOWN: RULES.prior_unknown})
+    @property
+    def p_value_of_usual(self) -> float:
+        """That of the sensors which are not odd."""
+        return self._p_value([self.evidence[i] for i in self.usual])
+
+    def _p_value(self, evidence: Sequence[SensorEvidence]) -> float:
+        """By the sensors or by their mean, if they have one: the smaller one of two."""
+        each = p_value([one.tested for one in evidence], {UNKNOWN: RULES.prior_unknown})
         return each if self.mean is None else min(2 * min(each, self.mean.detection.p_value), 1.0)
 
     @property
@@ -285,16 +290,6 @@ class Pass:
         """Numbers of the sensors that are not odd."""
         odd = {one.campaign for one in self.odd}
         return [i for i, each in enumerate(self.evidence) if each.campaign not in odd]
-
-    def without_odd(self) -> Pass:
-        """Return the pass without the odd sensors."""
-        usual = self.usual
-        return Pass(
-            tuple(self.sensors[i] for i in usual),
-            tuple(self.evidence[i] for i in usual),
-            None if self.sizes is None else self.sizes.only(usual),
-            self.mean,
-        )
 
     @cached_property
     def each(self) -> list[SensorState]:

@@ -157,12 +157,6 @@ class TypeSizes:
         variance = raw._variance(sum(float(one.z @ one.z) for one in some), redundancy)
         return cls(specs, effects, normal / variance, right / variance, usual)
 
-    def only(self, places: Sequence[int]) -> TypeSizes:
-        """Return what some of the sensors tell."""
-        at = [*places]
-        some = self.normal[at], self.right[at], self.usual[at]
-        return TypeSizes(self.specs, self.effects, *some)
-
     def _variance(self, squares: float, redundancy: int) -> float:
         """Noise variance that the best one or two effects leave."""
         left = [squares / redundancy]

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from accelstudy.adjustment.random_effects import RandomEffects
 from accelstudy.basics.plugins import file_key
-from accelstudy.campaign.sensor_type import TYPE_FILE, TypeFile, TypicalParameter
+from accelstudy.campaign.sensor_type import TYPE_FILE, TypeFile
 from accelstudy.data_sheets import DataSheet
 from accelstudy.files.outputs import whole_file
 
@@ -33,8 +33,6 @@ SHEET = {
     "thermal_scale": "scale_per_kelvin",
 }
 """Quantities of a data sheet, by the effect whose parameters are of that size."""
-BOUND_PROBABILITY = 0.9
-"""Probability with which the scatter is below its bound."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -44,18 +42,20 @@ class TypeParameter:
     Attributes
     ----------
     name, unit : str, SI
+    stays : bool, whether it belongs to the sensor, and not to its mounting
     values, sigmas : (n,) arrays, of the sensors; NaN where a campaign cannot show it
     usual, has : (n,) bool arrays, whether a sensor is not odd, and whether it has the parameter
     """
 
     name: str
     unit: str
+    stays: bool
     values: Array
     sigmas: Array
     usual: NDArray[np.bool_]
     has: NDArray[np.bool_]
 
-    @property
+    @cached_property
     def told(self) -> NDArray[np.bool_]:
         """Usual sensors that have it, and whose campaigns show it, (n,)."""
         return self.usual & self.has & np.isfinite(self.values) & np.isfinite(self.sigmas)
@@ -83,20 +83,21 @@ class TypeParameter:
         """Scatter from sensor to sensor, an sd."""
         return self.of_type.scatter
 
-    def scatter_interval(self, probability: float) -> tuple[float, float]:
-        """Interval that holds the scatter with a probability; that of one sensor has no end."""
-        return self.of_type.scatter_interval(probability) if self.of_type.dof else (0.0, np.inf)
-
-    @property
-    def content(self) -> dict[str, Any]:
-        """What lot.json has of it."""
-        keys = ("name", "mean", "scatter", "scatter_ci95", "sigma", "unit")
-        return {key: getattr(self, key) for key in keys}
-
     @property
     def scatter_ci95(self) -> tuple[float, float]:
-        """Interval that holds the scatter with a probability of 95 %."""
-        return self.scatter_interval(0.95)
+        """Interval that holds the scatter with a probability of 95 %; that of one has no end."""
+        return self.of_type.scatter_interval(0.95) if self.of_type.dof else (0.0, np.inf)
+
+    @property
+    def scatter_below(self) -> float:
+        """Bound below which the scatter is with a probability of 90 %; 0 if one sensor tells it."""
+        return self.of_type.scatter_interval(0.8)[1] if self.of_type.dof else 0.0
+
+    @property
+    def in_all(self) -> bool:
+        """Whether the next sensor has it, too: all that are usual and calibrated have it."""
+        calibrated = self.usual & np.isfinite(self.values)
+        return self.stays and 1 < np.count_nonzero(self.told) == np.count_nonzero(calibrated)
 
 
 def write_type(lot: Lot, folder: Path) -> bool:
@@ -119,9 +120,10 @@ def write_type(lot: Lot, folder: Path) -> bool:
     model = lot.diagnosis.model
     lasting = [effect for effect in model.effects if not effect.sudden]
     wanted = {parameter.name for effect in lasting for parameter in effect.parameters}
+    # Of what none of the usual sensors has, the campaigns of all tell.
     parameters = {
-        name: _typical(lot.parameters[name], sensors, bool(stays))
-        for name, stays in zip(model.parameter_names, model.stays, strict=True)
+        name: one if one.told.any() else replace(one, has=one.usual)
+        for name, one in lot.parameters.items()
         if name in wanted
     }
     sheet = {**file_key(), **_sheet(lot, parameters).content}
@@ -138,30 +140,7 @@ def write_type(lot: Lot, folder: Path) -> bool:
     return True
 
 
-def _typical(parameter: TypeParameter, sensors: int, stays: bool) -> TypicalParameter:
-    """Mean and scatter of a parameter, as the next sensor may have it.
-
-    Parameters
-    ----------
-    parameter : TypeParameter
-    sensors : int, that are usual and were calibrated
-    stays : bool, whether it belongs to the sensor
-    """
-    having = np.count_nonzero(parameter.told)
-    if not having:  # the campaigns of the other sensors tell of it
-        parameter = replace(parameter, has=parameter.usual)
-    _, below = parameter.scatter_interval(2 * BOUND_PROBABILITY - 1)
-    return TypicalParameter(
-        mean=parameter.mean,
-        sigma=parameter.sigma,
-        scatter=parameter.scatter,
-        scatter_below=below if np.isfinite(below) else 0.0,
-        unit=parameter.unit,
-        in_all=stays and 1 < having == sensors,
-    )
-
-
-def _sheet(lot: Lot, parameters: dict[str, TypicalParameter]) -> DataSheet:
+def _sheet(lot: Lot, parameters: dict[str, TypeParameter]) -> DataSheet:
     """Noise of a position mean, which is that of the median sensor, and errors when it is new."""
     title = f"{len(lot.usual)} sensors of a type"
     sensors = lot.diagnosis.last.sensors
