@@ -10,22 +10,22 @@ from importlib.resources import files
 from pathlib import Path
 from typing import Any
 
-from accelstudy.basics.bounds import Range
-from accelstudy.basics.errors import InputError, UnknownNameError, brief
+from pydantic import ConfigDict
+
+from accelstudy.basics.arguments import quantity
+from accelstudy.basics.errors import InputError, UnknownNameError
 from accelstudy.basics.plugins import error_as_line, installed_entry_points, label
-from accelstudy.basics.units import parse_quantity
 from accelstudy.campaign.sensor_type import TYPE_KEYS
-from accelstudy.data_sheets.sheet import MOST, QUANTITIES, DataSheet
+from accelstudy.data_sheets.sheet import QUANTITIES, DataSheet
 from accelstudy.files.reading import read_layer
+from accelstudy.files.validation import ConfigSection, validate
 
 TEXTS = ("name", "title", "source")
 LOGS = (".csv", ".txt", ".gz", ".mat", ".parquet", ".log", ".dat")
 """Endings of files that are no data sheets, though one can be made of them."""
 DENSITY = "noise_density"
-"""Another way to write the white noise: the one-sided density of most data sheets."""
-NOISE = (DENSITY, "velocity_random_walk", "position_sigma")
-LEAST = {"full_scale": 1.0, **dict.fromkeys(NOISE, 1e-12)}
-"""Smallest values, SI, of quantities that cannot be 0."""
+"""Another way to write the white noise, `WALK`: the one-sided density of most data sheets."""
+WALK = "velocity_random_walk"
 
 
 def data_sheet_names() -> tuple[str, ...]:
@@ -72,6 +72,15 @@ def read_data_sheet(path: str | Path) -> DataSheet:
     return parse_data_sheet(read_layer(path), str(path))
 
 
+class _Entry(ConfigSection):
+    """What a file says of a quantity."""
+
+    model_config = ConfigDict(coerce_numbers_to_str=True)
+
+    value: str
+    source: str | None = None
+
+
 def parse_data_sheet(content: Mapping[str, Any], source: str = "data sheet") -> DataSheet:
     """Make a data sheet of the content of a YAML file.
 
@@ -83,50 +92,32 @@ def parse_data_sheet(content: Mapping[str, Any], source: str = "data sheet") -> 
     InputError
         See `read_data_sheet`.
     """
-    keys = (*TEXTS, DENSITY, *QUANTITIES)
-    values: dict[str, float] = {}
+    quantities = {**QUANTITIES, DENSITY: QUANTITIES[WALK]}
+    values: dict[str, Any] = {"name": Path(source).stem}
     sources: dict[str, str] = {}
     try:
-        for key, entry in content.items():
-            if key in TYPE_KEYS:
-                continue
-            if key not in keys:
-                raise UnknownNameError("key", key, keys)
-            if key not in TEXTS:
-                values[key], sources[key] = _quantity(key, entry)
-        texts = {key: str(content[key]) for key in TEXTS if content.get(key) is not None}
-        if DENSITY in values:
-            if "velocity_random_walk" in values:
-                raise InputError(
-                    f"{DENSITY} and velocity_random_walk both say how large the white noise is; "
-                    "give one of them"
+        for key in [key for key in content if key not in TYPE_KEYS]:
+            entry = content[key]
+            if key in quantities:
+                stated = validate(
+                    _Entry, entry if isinstance(entry, Mapping) else {"value": entry}, key
                 )
-            values["velocity_random_walk"] = values.pop(DENSITY) / math.sqrt(2)
-            sources["velocity_random_walk"] = sources.pop(DENSITY)
-        content_si: dict[str, Any] = {"name": Path(source).stem, **texts, **values}
-        return DataSheet(**content_si, sources=sources)
+                values[key] = quantity(key, stated.value, quantities[key])
+                sources[key] = stated.source or ""
+            elif key not in TEXTS:
+                raise UnknownNameError("key", key, (*TEXTS, *quantities))
+            elif entry is not None:
+                values[key] = str(entry)
+        if DENSITY in values:
+            if WALK in values:
+                raise InputError(
+                    f"{DENSITY} and {WALK} both say how large the white noise is; give one of them"
+                )
+            values[WALK] = values.pop(DENSITY) / math.sqrt(2)
+            sources[WALK] = sources.pop(DENSITY)
+        return DataSheet(**values, sources=sources)
     except InputError as error:
         raise InputError(f"{source}: {error}") from None
-
-
-def _quantity(key: str, entry: Any) -> tuple[float, str]:
-    """Value and source of a quantity, in SI."""
-    unit = QUANTITIES["velocity_random_walk" if key == DENSITY else key][0]
-    text, where = entry, ""
-    if isinstance(entry, Mapping):
-        if extra := set(entry) - {"value", "source"}:
-            raise UnknownNameError(f"key of {key}", min(map(str, extra)), ("value", "source"))
-        if "value" not in entry:
-            raise InputError(f"{key}: value: missing")
-        text, where = entry["value"], str(entry.get("source") or "")
-    if not isinstance(text, str | int | float) or isinstance(text, bool):
-        raise InputError(f"{key}: must be a number with its unit, not {brief(text)}")
-    try:
-        size = parse_quantity(str(text), unit)
-    except InputError as error:
-        raise InputError(f"{key}: {error}") from None
-    Range(LEAST.get(key, 0.0), MOST[unit], unit).check_key(key, size)
-    return size, where
 
 
 @cache

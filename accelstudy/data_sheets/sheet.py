@@ -2,63 +2,67 @@
 
 from __future__ import annotations
 
+import inspect
 import math
 from collections.abc import Collection, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, fields
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import yaml
 
 from accelstudy.basics.errors import InputError
 from accelstudy.basics.progress import say, show
-from accelstudy.basics.units import STANDARD_GRAVITY, recorded_unit, to_recorded
+from accelstudy.basics.units import (
+    STANDARD_GRAVITY,
+    InputQuantity,
+    recorded_unit,
+    to_recorded,
+)
+from accelstudy.files.documents import ITEM
 from accelstudy.pages.result import Result
 
 if TYPE_CHECKING:
     import pandas as pd
     from matplotlib.axes import Axes
 
-QUANTITIES: dict[str, tuple[str, str]] = {
-    "velocity_random_walk": ("m/s^2/sqrt(Hz)", "white noise: the mean of τ s has the sd N/√τ"),
-    "bias_instability": ("m/s^2", "floor of the Allan deviation, divided by 0.664"),
-    "acceleration_random_walk": ("m/s^2/sqrt(s)", "random walk of the bias"),
-    "position_sigma": ("m/s^2", "sd of the mean of a hold, where no more is known of the noise"),
-    "repeatability": ("m/s^2", "change of the bias from one switching-on to the next, sd"),
-    "bias_per_kelvin": ("m/s^2/K", "temperature coefficient of the bias"),
-    "scale_per_kelvin": ("1/K", "temperature coefficient of the scale"),
-    "bias": ("m/s^2", "bias before calibration"),
-    "scale": ("1", "scale error before calibration"),
-    "nonorthogonality": ("rad", "deviation of the angles between the axes from a right angle"),
-    "alignment": ("rad", "rotation of the axes against the housing"),
-    "nonlinearity": ("1", "largest deviation from a straight line, in parts of the full scale"),
-    "full_scale": ("m/s^2", "the sensor measures ± this"),
-}
-"""Quantities of a data sheet: SI unit and meaning."""
-MOST = {
-    "m/s^2/sqrt(Hz)": 10.0,
-    "m/s^2/sqrt(s)": 10.0,
-    "m/s^2/K": 10.0,
-    "m/s^2": 1e6,
-    "1/K": 1.0,
-    "1": 1.0,
-    "rad": 1.0,
-}
-"""Largest value of a quantity by its unit; beyond it nothing is a sensor for leveling."""
 FLICKER = math.sqrt(2 * math.log(2) / math.pi)
 """Floor of the Allan deviation in parts of the bias instability B, 0.664 (IEEE Std 952)."""
+MIN_NOISE = 1e-12
+"""Least noise, SI: no sensor is without any."""
+MAX_FORCE = 1e6
+"""m/s²; no sensor for leveling has anything like it."""
+
+
+def _quantity(unit: str, most: float, least: float = 0.0) -> Any:
+    """Field of a quantity in the SI `unit`, unknown by default; its limits are those of files."""
+    return field(default=None, metadata={"quantity": InputQuantity(unit, least, most)})
 
 
 @dataclass(frozen=True, eq=False, repr=False)
 class DataSheet(Result):
     """What is known of a sensor before its calibration; None if a quantity is unknown.
 
-    Quantities are in SI; `QUANTITIES` explains them. White noise is given as its part of the Allan
-    deviation: the one-sided noise density of most data sheets is √2 times `velocity_random_walk`.
+    Quantities are in SI. White noise is given as its part of the Allan deviation: the one-sided
+    noise density of most data sheets is √2 times `velocity_random_walk`. The meanings below are
+    also those of the reference page, and of comments in files.
 
     Attributes
     ----------
     name, title, source : str
+    velocity_random_walk : white noise: the mean of τ s has the sd N/√τ
+    bias_instability : floor of the Allan deviation, divided by 0.664
+    acceleration_random_walk : random walk of the bias
+    position_sigma : sd of the mean of a hold, where no more is known of the noise
+    repeatability : change of the bias from one switching-on to the next, sd
+    bias_per_kelvin : temperature coefficient of the bias
+    scale_per_kelvin : temperature coefficient of the scale
+    bias : bias before calibration
+    scale : scale error before calibration
+    nonorthogonality : deviation of the angles between the axes from a right angle
+    alignment : rotation of the axes against the housing
+    nonlinearity : largest deviation from a straight line, in parts of the full scale
+    full_scale : the sensor measures ± this
     bias_rate : float, m/s²/s, drift of the bias, which only a history of the sensor tells
     sources : mapping of quantity to where its value comes from
     assumed : frozenset of quantities whose value is an assumption
@@ -67,19 +71,19 @@ class DataSheet(Result):
     name: str
     title: str = ""
     source: str = ""
-    velocity_random_walk: float | None = None
-    bias_instability: float | None = None
-    acceleration_random_walk: float | None = None
-    position_sigma: float | None = None
-    repeatability: float | None = None
-    bias_per_kelvin: float | None = None
-    scale_per_kelvin: float | None = None
-    bias: float | None = None
-    scale: float | None = None
-    nonorthogonality: float | None = None
-    alignment: float | None = None
-    nonlinearity: float | None = None
-    full_scale: float | None = None
+    velocity_random_walk: float | None = _quantity("m/s^2/sqrt(Hz)", 10.0, MIN_NOISE)
+    bias_instability: float | None = _quantity("m/s^2", MAX_FORCE)
+    acceleration_random_walk: float | None = _quantity("m/s^2/sqrt(s)", 10.0)
+    position_sigma: float | None = _quantity("m/s^2", MAX_FORCE, MIN_NOISE)
+    repeatability: float | None = _quantity("m/s^2", MAX_FORCE)
+    bias_per_kelvin: float | None = _quantity("m/s^2/K", 10.0)
+    scale_per_kelvin: float | None = _quantity("1/K", 1.0)
+    bias: float | None = _quantity("m/s^2", MAX_FORCE)
+    scale: float | None = _quantity("1", 1.0)
+    nonorthogonality: float | None = _quantity("rad", 1.0)
+    alignment: float | None = _quantity("rad", 1.0)
+    nonlinearity: float | None = _quantity("1", 1.0)
+    full_scale: float | None = _quantity("m/s^2", MAX_FORCE, 1.0)
     bias_rate: float | None = None
     sources: Mapping[str, str] = field(default_factory=dict)
     assumed: frozenset[str] = frozenset()
@@ -117,7 +121,7 @@ class DataSheet(Result):
             "source": self.source,
         }
         for key in self.known_quantities:
-            unit = QUANTITIES[key][0]
+            unit = QUANTITIES[key].unit
             value = float(to_recorded(getattr(self, key), unit))
             content[key] = {
                 "value": f"{value:.4g} {recorded_unit(unit)}",
@@ -130,7 +134,7 @@ class DataSheet(Result):
         """Text of a file for `read_data_sheet`; unknown quantities are comments."""
         lines = yaml.safe_dump(self.content, sort_keys=False, allow_unicode=True, width=96)
         rest = [
-            f"# {key}: {QUANTITIES[key][1]} (as in 1 {recorded_unit(QUANTITIES[key][0])})"
+            f"# {key}: {MEANINGS[key]} (as in 1 {recorded_unit(QUANTITIES[key].unit)})"
             for key in self.unknown_quantities
         ]
         more = ["# Unknown; add what the manufacturer states:", *rest] if rest else []
@@ -157,7 +161,7 @@ class DataSheet(Result):
         import pandas as pd
 
         known = self.known_quantities
-        rows = [(getattr(self, k), QUANTITIES[k][0], self.sources.get(k, "")) for k in known]
+        rows = [(getattr(self, k), QUANTITIES[k].unit, self.sources.get(k, "")) for k in known]
         index = pd.Index(known, name="quantity")
         return pd.DataFrame(rows, index, columns=["value", "unit", "source"])
 
@@ -256,6 +260,14 @@ class DataSheet(Result):
         if self.nonlinearity is None or self.full_scale is None:
             return None
         return 4 * self.nonlinearity * (STANDARD_GRAVITY / self.full_scale) ** 2
+
+
+QUANTITIES: dict[str, InputQuantity] = {
+    each.name: each.metadata["quantity"] for each in fields(DataSheet) if each.metadata
+}
+"""Quantities that a data sheet can state."""
+MEANINGS = dict(ITEM.findall(inspect.cleandoc(DataSheet.__doc__ or "")))
+"""What each attribute of a data sheet means."""
 
 
 def sheet_of_sigma(sigma: float) -> DataSheet:

@@ -10,7 +10,7 @@ import accelstudy
 from accelstudy.approaches import get_approach
 from accelstudy.basics.units import shown_unit, to_attitude, to_display
 from accelstudy.data_sheets import data_sheet_names, get_data_sheet
-from accelstudy.data_sheets.sheet import QUANTITIES
+from accelstudy.data_sheets.sheet import MEANINGS, QUANTITIES
 from accelstudy.effects import get_effect
 from accelstudy.noise_effects import get_noise_effect
 from accelstudy.schemes import get_scheme, scheme_families, scheme_names
@@ -97,10 +97,12 @@ def data_sheets():
     """Data sheets, and where they come from."""
     sheets = {name: get_data_sheet(name) for name in data_sheet_names()}
     rows = []
-    for name, (unit, meaning) in QUANTITIES.items():
+    for name, quantity in QUANTITIES.items():
         values = [getattr(sheet, name) for sheet in sheets.values()]
-        shown = ["" if value is None else number(to_display(value, unit)) for value in values]
-        rows.append((code(name), meaning, shown_unit(unit), *shown))
+        shown = [
+            "" if value is None else number(to_display(value, quantity.unit)) for value in values
+        ]
+        rows.append((code(name), MEANINGS[name], shown_unit(quantity.unit), *shown))
     sources = [(code(name), sheet.title, sheet.source) for name, sheet in sheets.items()]
     return page(
         table(("quantity", "meaning", "unit", *map(code, sheets)), rows),
