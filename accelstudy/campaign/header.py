@@ -9,8 +9,8 @@ from typing import Annotated, Any, ClassVar, Literal, Self
 import numpy as np
 from pydantic import (
     AfterValidator,
+    AliasChoices,
     BeforeValidator,
-    ConfigDict,
     Field,
     StrictInt,
     StrictStr,
@@ -64,8 +64,6 @@ class LogLayout(ConfigSection):
     Scale and offset are in the order of the log's own axes, whatever its frame.
     """
 
-    # `rate_hz` is the key of 0.1 to 0.3.
-    model_config = ConfigDict(populate_by_name=True)
     retired: ClassVar = {"delimiter": "it is told from the rows"}
 
     columns: dict[str, Place] = Field(
@@ -77,8 +75,10 @@ class LogLayout(ConfigSection):
     time_unit: Annotated[
         Literal["s", "ms", "us", "ns"], BeforeValidator(_usual_spelling(*CLOCK_UNITS))
     ] = Field("s", description="unit of that column")
-    rate_hz: Annotated[Rate | None, in_unit("Hz")] = Field(
-        None, alias="rate", description="samples per second, without time"
+    rate: Annotated[Rate | None, in_unit("Hz")] = Field(
+        None,
+        validation_alias=AliasChoices("rate", "rate_hz"),  # as 0.1 to 0.3 wrote it
+        description="samples per second, without time",
     )
     variable: str | None = Field(
         None, description="which array of a MATLAB file, topic of a bag, or instance of a ULog"

@@ -15,15 +15,16 @@ from accelstudy.basics.errors import InputError, key
 from accelstudy.basics.units import GON
 from accelstudy.campaign.calibration.sensor_calibration import SensorCalibration, read_calibration
 from accelstudy.campaign.gross_errors.recognition import check_size
-from accelstudy.campaign.header import LogLayout
-from accelstudy.campaign.importing.columns import AXES
-from accelstudy.campaign.importing.holds import MAX_WANDER, Holds, reaches_range, scatter
-from accelstudy.campaign.importing.log import open_log
+from accelstudy.campaign.importing.holds import (
+    MAX_WANDER,
+    Holds,
+    reaches_range,
+    scatter,
+    windows_at_rest,
+)
+from accelstudy.campaign.importing.log import Log, join, read_log
 from accelstudy.campaign.importing.noise import hold_noise, sigma_text
-from accelstudy.campaign.importing.recording import Recording
-from accelstudy.campaign.importing.windows import Windows
 from accelstudy.campaign.reference import ReferenceSensor
-from accelstudy.files.validation import validate
 from accelstudy.leveling.angles import angles_of, near_pole
 from accelstudy.sensors.frames import Frame
 
@@ -50,7 +51,7 @@ MIN_HOLDS = 8
 
 
 def reference_of(given: Mapping[str, Any]) -> ReferenceLog | None:
-    """Open the log of a reference as keywords say; without them there is none.
+    """Read the log of a reference as keywords say; without them there is none.
 
     It is read like the log of its calibration, unless `reference_columns` says otherwise.
 
@@ -61,44 +62,42 @@ def reference_of(given: Mapping[str, Any]) -> ReferenceLog | None:
         angles with their sigmas.
     """
     path, calibration, columns, offset = (given[name] for name in KEYWORDS)
-    of_log, of_calibration = key("reference_log"), key("reference")
-    if path is None:
-        if calibration is not None:
-            raise InputError(f"{of_calibration}: give the raw log of that sensor by {of_log}")
+    if path is None or calibration is None:
         for name in (name for name in KEYWORDS if given[name] is not None):
-            raise InputError(f"{key(name)}: goes with {of_log} and {of_calibration}")
+            raise InputError(
+                f"{key(name)}: give both the raw log of a calibrated sensor (`reference_log`) and "
+                "its calibration.json (`reference`)"
+            )
         return None
-    if calibration is None:
-        raise InputError(f"{of_log}: give the calibration.json of that sensor by {of_calibration}")
     sensor, columns = usable_reference(calibration), dict(columns or {})
-    if unknown := [name for name in columns if name not in (*AXES, "time")]:
-        raise InputError(
-            f"`reference_columns`: {unknown[0]}: expected {', '.join(AXES)} and perhaps time"
-        )
-    content = {"time": columns.pop("time", None), "columns": columns}
-    layout = validate(LogLayout, content, "`reference_columns`").model_dump(
-        include={name for name in content if content[name] not in (None, {})}
-    )
+    layout = {"time": columns.pop("time", None), "columns": columns}
     try:
-        log = open_log(path, layout, like=sensor.usual_layout, wanted=("time",))
-        _ = log.layout
+        said = {name: value for name, value in layout.items() if value not in (None, {})}
+        log = read_log(path, said, sensor.usual_layout)
+        log.check_timed()
     except InputError as error:
-        said = str(error).partition("; ")[0]
+        wrong = str(error).partition("; ")[0]
         raise InputError(
-            f"`reference_log` {said}; it is read like the log of `reference`, and "
+            f"`reference_log` {wrong}; it is read like the log of `reference`, and "
             "`reference_columns` fx=…,fy=…,fz=…,time=… names other columns"
         ) from None
-    return ReferenceLog(path, sensor, Recording([log]), offset)
+    return ReferenceLog(sensor, join([log]), offset or 0.0)
 
 
 @dataclass(frozen=True)
 class ReferenceLog:
-    """The open log of a reference, and its calibration; see `reference_of`."""
+    """The log of a reference, and its calibration; see `reference_of`.
 
-    path: Path
+    Attributes
+    ----------
+    calibration : SensorCalibration
+    log : Log, joined
+    offset : float, s, that is added to its times
+    """
+
     calibration: SensorCalibration
-    log: Recording
-    offset: float | None
+    log: Log
+    offset: float = 0.0
 
     def angles_for(
         self, holds: Holds, offset: Array, gravity: float
@@ -126,15 +125,14 @@ class ReferenceLog:
         """
         # Both begin together unless they have one clock.
         apart = self.log.starts[0] - holds.log.starts[0]
-        records, lost = self._records(holds, float(np.nan_to_num(apart)) + (self.offset or 0.0))
-        holds = holds.without(lost)
-        means = np.array([records[n].mean(axis=0) for n in holds.table.index])
+        records, lost = self._records(holds, float(np.nan_to_num(apart)) + self.offset)
+        table = holds.table.drop(index=[*lost])
+        means, used = np.array([records[n].mean(axis=0) for n in table.index]), table.left_out == ""
         self._check_size(means, gravity)
-        own, used = self.calibration.correct(means), holds.are_used
-        frame = self._frame((holds.means - offset)[used], own[used])
+        own, forces = self.calibration.correct(means), table[["fx", "fy", "fz"]].to_numpy() - offset
+        frame = self._frame(forces[used], own[used])
         angles = angles_of(frame.to_frd(own))
-        resting = [records[n] for n in holds.table.index[used]]
-        noise = hold_noise(resting, self.log.step).accuracy.allan
+        noise = hold_noise([records[n] for n in table.index[used]], self.log.step).accuracy.allan
         reference = ReferenceSensor(
             calibration=self.calibration.content["campaign"],
             frame=frame.name,
@@ -146,20 +144,17 @@ class ReferenceLog:
         sigma, common = reference.errors(angles, gravity)
         poles = near_pole(angles, np.hypot(sigma, np.linalg.norm(common, axis=-1)))
         why = "the x axis of the reference is too near to the vertical for a roll"
-        near = dict.fromkeys(holds.table.index[poles].tolist(), why)
-        holds = replace(
-            holds,
-            left_out={**near, **holds.left_out},
-            warnings=(*holds.warnings, *(f"hold {n} left out: {why}" for n in near)),
-        )
+        lost |= dict.fromkeys(table.index[poles].tolist(), why)
+        table["left_out"] = table["left_out"].where(~(poles & used), why)
+        warnings = [f"hold {n} left out: {reason}" for n, reason in lost.items()]
         clock = "of the same clock" if np.isfinite(apart) else "begun together with the log"
-        clock += "" if self.offset is None else f", {self.offset:+g} s"
+        clock += f", {self.offset:+g} s" if self.offset else ""
         return (
-            holds,
+            replace(holds, table=table, warnings=(*holds.warnings, *warnings)),
             angles,
             reference,
             (
-                f"reference: {self.path}, {clock}; its axes x, y, z point "
+                f"reference: {self.log.path}, {clock}; its axes x, y, z point "
                 f"{frame.description.split(': ')[1]}, as frd of the sensor; sigma of a mean: "
                 f"{sigma_text(noise)}"
             ),
@@ -167,16 +162,16 @@ class ReferenceLog:
 
     def _records(self, holds: Holds, apart: float) -> tuple[dict[int, Array], dict[int, str]]:
         """Samples (m, 3) of the reference, m/s², in holds, and why it has none in others."""
-        read, table, where = self.log, holds.table, f"`reference_log` {self.path}"
+        log, table, where = self.log, holds.table, f"`reference_log` {self.log.path}"
         full_range = self.calibration.content.get("range_mps2") or np.inf
-        limit = MAX_WANDER * Windows.lasting(read).threshold().sd
-        time, forces = read.time + apart, read.forces @ self.calibration.mending.T
+        limit = MAX_WANDER * windows_at_rest(log).threshold
+        time, forces = log.time + apart, log.forces @ self.calibration.mending.T
         records: dict[int, Array] = {}
         lost: dict[int, str] = {}
         moving = 0
         for n, t0, t1 in table[["t0", "t1"]].itertuples():
             record = forces[slice(*np.searchsorted(time, [t0, t1 + holds.log.step / 2]))]
-            if len(record) * read.step < MIN_COVERAGE * (t1 - t0) or len(record) < MIN_SAMPLES:
+            if len(record) * log.step < MIN_COVERAGE * (t1 - t0) or len(record) < MIN_SAMPLES:
                 lost[n] = "the reference log does not cover it"
             elif reaches_range(record, full_range):
                 lost[n] = "the reference is saturated"
@@ -202,9 +197,9 @@ class ReferenceLog:
 
     def _check_size(self, means: Array, gravity: float) -> None:
         """Check that means of the reference, (n, 3), are as large as gravity."""
-        first, where = self.log.first, f"`reference_log` {self.path}"
+        layout, where = self.log.layout, f"`reference_log` {self.log.path}"
         try:
-            check_size(where, means, gravity, first.layout.unit, first.layout.conversion)
+            check_size(where, means, gravity, layout.unit, layout.conversion)
         except InputError as error:
             raise InputError(
                 f"{str(error).split('; give')[0]}; it is read in the unit of the log of which "
@@ -223,14 +218,14 @@ class ReferenceLog:
         InputError
             If a rotation does not explain them, or it is not small beside the quarter turns.
         """
-        log = f"`reference_log` {self.path}"
+        where = f"`reference_log` {self.log.path}"
         if len(own) >= MIN_HOLDS:
             design = np.column_stack([own, np.ones(len(own))])
             left = forces - design @ np.linalg.lstsq(design, forces, rcond=None)[0]
             misfit = np.sqrt(np.mean(np.sum(left**2, axis=1))) / self.calibration.gravity
             if misfit > MIN_MISFIT:
                 raise InputError(
-                    f"{log}: the two sensors do not turn together: their forces differ by "
+                    f"{where}: the two sensors do not turn together: their forces differ by "
                     f"{misfit:.2g} g, whatever the rotation between them; are they on one plate, "
                     "and are the times of the reference right (`reference_offset`)?"
                 )
@@ -241,9 +236,9 @@ class ReferenceLog:
         rest = float(np.arccos(np.clip((traces[best] - 1) / 2, -1, 1)))
         if rest > MAX_ROTATION:
             raise InputError(
-                f"{log}: besides quarter turns, the reference is turned by {rest / GON:.0f} gon "
-                f"against the sensor; mount it within {MAX_ROTATION / GON:.0f} gon, "
-                "as only a small rotation is estimated"
+                f"{where}: besides quarter turns, the reference is turned by {rest / GON:.0f} gon "
+                f"against the sensor; mount it within {MAX_ROTATION / GON:.0f} gon, as only a "
+                "small rotation is estimated"
             )
         return best
 

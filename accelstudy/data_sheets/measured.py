@@ -34,9 +34,7 @@ def sheet_of_log(path: str | Path, settings: ImportSettings) -> DataSheet:
     """
     _, holds = import_log(path, settings)
     assert holds is not None
-    noise = holds.noise
-    curve = noise.allan.channels(noise.of_sensor)
-    return sheet_of_allan(curve, Path(path).stem, str(path))
+    return sheet_of_allan(holds.noise.allan, Path(path).stem, str(path))
 
 
 def sheet_of_allan(curve: AllanDeviation, name: str, source: str) -> DataSheet:

@@ -51,8 +51,8 @@ def read_log(
     Returns
     -------
     Log
-        Its raw table is `source.table`, and `samples` is a DataFrame in SI. `find_holds` and
-        `apply` take it.
+        Its raw table is `raw.content`, of Arrow, and `samples` is a DataFrame in SI. `find_holds`
+        and `apply` take it.
 
     Raises
     ------
@@ -60,10 +60,10 @@ def read_log(
         If there is no such file, or a value is wrong.
     """
     keywords = {**locals()}
-    from accelstudy.campaign.importing.log import open_log
+    from accelstudy.campaign.importing.log import read_log
     from accelstudy.campaign.importing.settings import layout_of
 
-    return open_log(log, layout_of(keywords))
+    return read_log(log, layout_of(keywords))
 
 
 @verb

@@ -15,7 +15,7 @@ from functools import cached_property
 from pathlib import Path
 
 import numpy as np
-import pyarrow as pa
+import pandas as pd
 from numpy.typing import NDArray
 from scipy import optimize, special
 
@@ -23,7 +23,6 @@ from accelstudy.basics.errors import InputError
 from accelstudy.campaign.importing.holds import Holds
 from accelstudy.campaign.importing.logs import import_log
 from accelstudy.campaign.importing.settings import ImportSettings
-from accelstudy.campaign.importing.sources import Source
 from accelstudy.campaign.session import Campaign
 from accelstudy.sensors.conversion import conversion_of
 from studies.hidden.physics.conditions import Conditions, Shape
@@ -158,7 +157,9 @@ class Donor:
         factor = np.sqrt(size / np.sum((parameters @ left) ** 2))
         return Cause(kind, settings, parameters[None] * factor, size)
 
-    def changed(self, causes: Sequence[Cause], recorded: bool) -> tuple[Source, ImportSettings]:
+    def changed(
+        self, causes: Sequence[Cause], recorded: bool
+    ) -> tuple[pd.DataFrame, ImportSettings]:
         """The log with effects in its readings, and how it is imported.
 
         If that is `recorded`, it has columns of the temperature and the time.
@@ -176,7 +177,8 @@ class Donor:
         if given.time is not None or (recorded and not self.timed):
             table["time"], time = self.time, "time"
         layout = {"columns": columns, "time": time, "time_unit": "s", "variable": None}
-        return Source(self.name, pa.table(table)), given.model_copy(update=layout)
+        layout |= {"name": given.name or self.name}
+        return pd.DataFrame(table), given.model_copy(update=layout)
 
 
 def means_of(values: Array, spans: Spans) -> Array:

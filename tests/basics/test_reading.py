@@ -9,7 +9,7 @@ from calling import refused
 
 from accelstudy.basics.errors import InputError
 from accelstudy.campaign.calibration.sensor_calibration import read_calibration
-from accelstudy.campaign.importing.formats import open_source
+from accelstudy.campaign.importing.formats import read_table
 from accelstudy.files import reading
 from accelstudy.files.reading import read_layer
 from accelstudy.files.tables import open_parquet
@@ -22,7 +22,7 @@ def read_parquet(path):
         return file.read()
 
 
-READERS = (read_layer, read_calibration, open_source, read_parquet)
+READERS = (read_layer, read_calibration, read_table, read_parquet)
 
 
 @pytest.mark.parametrize("read", READERS)

@@ -31,7 +31,7 @@ AT_REST = np.random.default_rng(1).normal([0.5, -0.3, -9.7], 0.3, (30, 3))
 LOG = pd.DataFrame(AT_REST, columns=["fx", "fy", "fz"])
 SETTINGS = {
     "name": "log", "columns": {"fx": 0, "fy": "fy", "fz": 2}, "rate": 10.0, "unit": "counts",
-    "scale": [1.0, 1.1, 1.0], "offset": 0.1, "gravity": {"value_mps2": 9.81, "sigma_mps2": 0.0},
+    "scale": [1.0, 1.1, 1.0], "offset": 0.1, "gravity": 9.81, "gravity_sigma": 0.0,
     "frame": "flu", "range": 1000.0, "exclude": [], "window": 1.0,
     "threshold": 10.0, "trim": 0.0, "shortest": 1.0,
 }  # fmt: skip

@@ -17,7 +17,6 @@ from accelstudy.basics.units import GON, MGON
 from accelstudy.campaign.calibration.leveling import level
 from accelstudy.campaign.calibration.sensor_calibration import calibration_of
 from accelstudy.campaign.header import LogLayout
-from accelstudy.campaign.importing.sources import Source
 from accelstudy.effects import HoldConditions
 from accelstudy.leveling.angles import specific_force
 from accelstudy.schemes import get_scheme
@@ -123,8 +122,7 @@ def rows_of(effects, values, **columns):
 
 def leveled_rows(calibration, rows, given=None, **options):
     """The rows leveled, and the warnings."""
-    log = Source("rows", pa.Table.from_pandas(rows, preserve_index=False))
-    leveled = level(calibration, log, given, **options)
+    leveled = level(calibration, rows, given, **options)
     return leveled.to_frame(), list(leveled.warnings)
 
 
@@ -179,7 +177,7 @@ def test_a_drift_stays_where_the_session_left_it():
     own = calibrated("bias_drift", values)
     # The sensor stops drifting at the end of the session, in the first tenth of the log.
     time = np.minimum(150.0 * np.arange(40), SESSION)
-    rows, rate = rows_of("bias_drift", values, time=time)[AXES], {"rate_hz": 1 / 150}
+    rows, rate = rows_of("bias_drift", values, time=time)[AXES], {"rate": 1 / 150}
     table, (warning,) = leveled_rows(own, rows, rate, sigma=0.0, start=0)
     assert_leveled(table)
     assert "bias_drift: kept constant after the end of the calibration session" in warning
@@ -318,7 +316,7 @@ def test_parquet_keeps_its_types(plain, tmp_path):
     assert pq.read_table(tmp_path / "out.parquet").select(log.column_names).equals(log)
     level_log(plain, tmp_path / "log.parquet", tmp_path / "out.csv")
     given = {"columns": {"fx": "when", "fy": "fy", "fz": "fz"}}
-    with pytest.raises(InputError, match="column when is timestamp"):
+    with pytest.raises(InputError, match="fx and time name the same column"):
         level_log(plain, tmp_path / "log.parquet", tmp_path / "no.csv", given)
     text = (tmp_path / "out.csv").read_text(encoding="utf-8").splitlines()
     assert text[1].startswith("1,1.5,9,1,1970-01-01 00:00:00.000000000,")
@@ -351,7 +349,7 @@ def test_a_log_without_names_is_written_with_places(plain, log, tmp_path, wanted
     forces = mixed_log()[AXES].to_numpy(float)
     np.savetxt(log, np.column_stack([forces, np.full(N, 5)]), "%.4f", delimiter=";")
     given = {"columns": {"fx": 0, "fy": "1", "fz": 2}}
-    known = with_keys(plain, log=LogLayout(**given, rate_hz=100))
+    known = with_keys(plain, log=LogLayout(**given, rate=100))
     for calibration, *options in ((plain, given), (known,)):
         level_log(calibration, log, tmp_path / wanted, *options)
         read = pd.read_csv if ".csv" in wanted else pd.read_parquet

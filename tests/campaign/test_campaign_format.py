@@ -30,7 +30,7 @@ HEADER = {
     "name": "small", "sensor": "a sensor", "range_mps2": 20.0,
     "gravity": {"value_mps2": G, "sigma_mps2": 1e-5},
     "sensor_noise": {"sigma_mps2": 0.002}, "robot": {"angle_sigma_mgon": 3.2},
-    "log": LogLayout(columns={"fx": 0, "fy": "b", "fz": 2}, rate_hz=100, frame="flu"),
+    "log": LogLayout(columns={"fx": 0, "fy": "b", "fz": 2}, rate=100, frame="flu"),
 }  # fmt: skip
 
 

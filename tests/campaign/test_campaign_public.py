@@ -43,7 +43,7 @@ def test_the_registry_says_how_a_file_is_read(name):
     if settings is not None:
         assert {*settings.columns} == {"fx", "fy", "fz"}
         assert (settings.scale is not None) == (settings.unit == "counts")
-        timed = settings.rate_hz is not None or settings.time is not None
+        timed = settings.rate is not None or settings.time is not None
         assert settings.means or settings.block is not None or timed
 
 

@@ -21,7 +21,7 @@ def white(seed=1, n=N):
 
 def allan_deviation(values, step):
     """Allan deviation of one record, (n,) or (n, channels)."""
-    return pooled_deviation([values], step)
+    return pooled_deviation([values.reshape(len(values), -1)], step)
 
 
 def test_definition():

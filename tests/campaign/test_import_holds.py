@@ -8,7 +8,7 @@ from log_helpers import RATE, G, find_holds, opened, session
 
 def spans(holds):
     """First samples of holds that are used, and those after the last."""
-    return holds.table.drop(index=[*holds.left_out])[["start", "end"]].to_numpy().T
+    return holds.table[holds.used][["start", "end"]].to_numpy().T
 
 
 @pytest.mark.parametrize("seed", range(3))
@@ -30,7 +30,7 @@ def test_known_holds(tmp_path, seed, sigma):
         own = forces[start[i] : end[i]]
         np.testing.assert_allclose(holds.means[i], own.mean(axis=0), rtol=1e-12, atol=1e-12)
         np.testing.assert_allclose(sds[i], own.std(axis=0, ddof=1), rtol=1e-9)
-    assert holds.threshold.floor == pytest.approx(sigma * 3**0.25, rel=0.1)
+    assert holds.windows.floor == pytest.approx(sigma * 3**0.25, rel=0.1)
 
 
 def test_no_hold_spans_a_gap(tmp_path):
@@ -39,7 +39,7 @@ def test_no_hold_spans_a_gap(tmp_path):
     middle = edges[3].mean().astype(int)
     time[middle:] += 10
     log = opened(tmp_path, forces, time)
-    holds = find_holds(log, shortest_s=0.5)
+    holds = find_holds(log, shortest=0.5)
     assert "1 gap in time; no hold spans one" in holds.warnings
     assert len(holds.table) == len(edges) + 1
     assert not np.any(
@@ -54,7 +54,7 @@ def test_a_frozen_channel_does_not_lower_the_floor(tmp_path):
     frozen[edges[2, 0] : edges[5, 1]] = frozen[edges[2, 0]]
     frozen[edges[6, 0] : edges[6, 1], 1] = frozen[edges[6, 0], 1]
     holds = find_holds(opened(tmp_path, frozen))
-    assert holds.threshold.sd == pytest.approx(sound.threshold.sd, rel=0.05)
+    assert holds.windows.threshold == pytest.approx(sound.windows.threshold, rel=0.05)
     np.testing.assert_array_equal(spans(holds)[0], spans(sound)[0][[0, 1, 7]])
     assert any("does not change over a window in" in text for text in holds.warnings)
 
@@ -77,11 +77,11 @@ def test_override_and_limits(tmp_path):
     forces, edges = session()
     log = opened(tmp_path, forces)
     chosen = find_holds(log)
-    given = find_holds(log, threshold_mps2=chosen.threshold.sd)
-    assert given.threshold.reason == "as given"
+    given = find_holds(log, threshold=chosen.windows.threshold)
+    assert given.windows.reason == "as given"
     pd.testing.assert_frame_equal(given.table, chosen.table, rtol=1e-5, atol=1e-8)
-    assert len(find_holds(log, threshold_mps2=100.0).table) == 1
-    longer = find_holds(log, trim_s=0.5)
+    assert len(find_holds(log, threshold=100.0).table) == 1
+    longer = find_holds(log, trim=0.5)
     np.testing.assert_array_equal(spans(longer).T, spans(chosen).T + np.array([30, -30]))
     assert len(edges) == len(chosen.table)
 

@@ -121,7 +121,7 @@ def test_parquet_and_gzip(tmp_path):
 
 def test_three_columns_need_no_names(tmp_path):
     np.savetxt(tmp_path / "log.txt", FORCES, "%.3f")
-    np.testing.assert_array_equal(open_log(tmp_path / "log.txt", rate_hz=1).forces, FORCES)
+    np.testing.assert_array_equal(open_log(tmp_path / "log.txt", rate=1).forces, FORCES)
 
 
 @pytest.mark.parametrize(("text", "row", "says"), [
@@ -157,7 +157,7 @@ def test_what_is_no_table_is_no_more_work_than_its_size(tmp_path, monkeypatch, t
 
     monkeypatch.setattr(texts, "split_line", counting)
     with pytest.raises(InputError):
-        open_log(written(tmp_path, text), rate_hz=1)
+        open_log(written(tmp_path, text), rate=1)
     assert sum(looked_at) < 20 * len(text)
 
 
@@ -188,13 +188,13 @@ cells = st.one_of(
 @given(
     st.lists(st.lists(cells, max_size=6), max_size=40),
     st.sampled_from([",", ";", " ", "\t", ", "]),
-    st.sampled_from([{"rate_hz": 100.0}, {"rate_hz": 3.0}, {"time": 0}, {}]),
+    st.sampled_from([{"rate": 100.0}, {"rate": 3.0}, {"time": 0}, {}]),
     st.sampled_from([None, {"fx": 0, "fy": 1, "fz": 2}, {"fx": 3, "fy": 1, "fz": 2}]),
 )
-@example([["1", "2", "3"], ["1", "2", "3", "4"], ["2", "3", "4"]], ",", {"rate_hz": 9.0}, None)
-@example([['"'], ["0.0", "0.0", '"']], ",", {"rate_hz": 100.0}, None)
-@example([["1_0", "\u2028", "1", "1", "\u2028"], ["1e400"]], " ", {"rate_hz": 100.0}, None)
-@example([["1", "", "2", '"\n,1,nan\n"', "\t", "#"]], ",", {"rate_hz": 100.0}, None)
+@example([["1", "2", "3"], ["1", "2", "3", "4"], ["2", "3", "4"]], ",", {"rate": 9.0}, None)
+@example([['"'], ["0.0", "0.0", '"']], ",", {"rate": 100.0}, None)
+@example([["1_0", "\u2028", "1", "1", "\u2028"], ["1e400"]], " ", {"rate": 100.0}, None)
+@example([["1", "", "2", '"\n,1,nan\n"', "\t", "#"]], ",", {"rate": 100.0}, None)
 def test_whatever_the_text(tmp_path, rows, separator, timing, columns):
     path = tmp_path / "log.csv"
     path.write_text("\n".join(separator.join(row) for row in rows), encoding="utf-8")
@@ -203,7 +203,7 @@ def test_whatever_the_text(tmp_path, rows, separator, timing, columns):
         log = open_log(path, columns=columns, **timing)
         assert len(log.time) == len(log.forces)
         assert np.isfinite(log.forces).all()
-        find_holds(log, ImportSettings(shortest_s=0.1, window_s=0.5))
+        find_holds(log, ImportSettings(shortest=0.1, window=0.5))
     except InputError as error:  # nothing else passes
         message = str(error)
     assert len(message.splitlines()) <= 1

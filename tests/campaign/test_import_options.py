@@ -126,7 +126,7 @@ def test_the_figure_shows_forces_without_the_offset_that_was_found(tmp_path, tur
 
     monkeypatch.setattr(segmentation_figure, "draw_segmentation", keep)
     raw = turned[0] / 0.001 + [33000, 33100, 32900]
-    settings = ImportSettings(rate_hz=RATE, unit="counts", scale=0.001)
+    settings = ImportSettings(rate=RATE, unit="counts", scale=0.001)
     imported, out = LogImport(*import_log(write(tmp_path, raw), settings)), tmp_path / "out"
     with drawn():
         imported.write(out, out)

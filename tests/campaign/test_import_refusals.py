@@ -81,7 +81,7 @@ REFUSED = [
     (("log.parquet", b"PAR1" + bytes(99)), "", "not a whole Parquet file"),
     (("log.parquet", parquet(["t", "fx", "fy", "fz", "fx"], *TABLE.T, TIME)), "", "which column"),
     (("log.parquet", parquet(["t", "fx", "fy", "fz"], *TABLE.T[:3], ["a"] * 50)), "",
-     "column fz is string, not numbers"),
+     "column fz (fz): 'a', not a usable number"),
     (("log.mat", matlab(log=TABLE)[:300]), "", "not a whole MATLAB file"),
     (("log.mat", matlab(log=TABLE, other=FORCES)), "--rate 4", "which array? There are log, other"),
     (("log.mat", matlab(log=TABLE, other=FORCES)), "--variable othr", "did you mean 'other'"),

@@ -13,8 +13,8 @@ from recorded import EPOCH, message, ulog, write_bag, write_ulog
 
 import accelstudy as acs
 from accelstudy.basics.units import STANDARD_GRAVITY as G
-from accelstudy.campaign.importing.formats import open_source
-from accelstudy.campaign.importing.windows import window_variance
+from accelstudy.campaign.importing.formats import read_table
+from accelstudy.campaign.importing.holds import window_variance
 
 TIME, FORCES = by_hand()
 N = len(TIME)
@@ -312,14 +312,14 @@ def test_apply_takes_them_whatever_the_campaign_was_made_of(folder, tmp_path, ca
 
 def test_a_flight_log_that_ends_early(folder, tmp_path):
     path, whole = tmp_path / "log.ulg", (folder / "one.ulg").read_bytes()
-    assert not open_source(folder / "one.ulg").warnings
+    assert not read_table(folder / "one.ulg").warnings
     path.write_bytes(whole[: len(whole) // 2 + 5])
     text = succeed("import", path, "--no-figure", "--out", tmp_path / "out").stderr
     assert "the flight log ends early or is damaged: its samples are whole up to" in text
     assert acs.read_campaign(tmp_path / "out").n_positions in (6, 7)
     middle = len(whole) // 2
     path.write_bytes(whole[:middle] + b"\xff" * 300 + whole[middle + 300 :])
-    assert "is damaged" in open_source(path).warnings[0]
+    assert "is damaged" in read_table(path).warnings[0]
 
 
 def test_a_bag_with_fewer_messages_than_it_says(tmp_path):

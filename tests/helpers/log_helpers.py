@@ -10,7 +10,6 @@ from accelstudy.basics.units import STANDARD_GRAVITY
 from accelstudy.campaign.header import LogLayout
 from accelstudy.campaign.importing import holds as detector
 from accelstudy.campaign.importing import log as logs
-from accelstudy.campaign.importing.recording import Recording
 from accelstudy.campaign.importing.settings import ImportSettings
 from accelstudy.files.validation import validate
 
@@ -57,12 +56,12 @@ def write(folder, forces, time=None):
 def open_log(path, **layout):
     """Open a log as keys of its layout say."""
     given = validate(LogLayout, layout, "layout").model_dump(exclude_unset=True, exclude_none=True)
-    return Recording([logs.open_log(path, given)])
+    return logs.join([logs.read_log(path, given)])
 
 
 def opened(folder, forces, time=None, **options):
     rate = RATE if time is None else None
-    return open_log(write(folder, forces, time), rate_hz=rate, **options)
+    return open_log(write(folder, forces, time), rate=rate, **options)
 
 
 def find_holds(log, **options):

@@ -45,7 +45,7 @@ def test_a_table_that_is_leveled_keeps_its_index_and_columns(calibration, table)
     pd.testing.assert_frame_equal(calibration.apply(leveled), leveled)
     by_number = table.set_axis([0, 1, 2, "note"], axis=1)
     log = acs.read_log(by_number, rate=1, columns={"fx": 0, "fy": 1, "fz": 2})
-    assert repr(log) == "Log('DataFrame', columns, rate_hz)"
+    assert repr(log) == "Log('DataFrame', columns, rate)"
     by_number.iloc[:, :3] = 0.0  # a log is what it was when it was given
     other = calibration.apply(log)
     assert list(other.columns[:4]) == [0, 1, 2, "note"]

@@ -16,8 +16,10 @@ from study_helpers import content, grid
 import accelstudy
 from accelstudy.basics.errors import OPTIONS
 from accelstudy.basics.units import STANDARD_GRAVITY
+from accelstudy.campaign.header import LogLayout
 from accelstudy.campaign.importing.settings import ImportSettings
 from accelstudy.commands.main import main
+from accelstudy.files.validation import validate
 from accelstudy.verbs import kinds
 
 TERMINAL = {"out", "force", "quiet", "angle_unit", "plugin", "figure", "truth"}
@@ -133,19 +135,23 @@ def test_the_noise_of_the_robot_has_one_name(verb: str, old: str) -> None:
 
 
 def test_keywords_of_an_import_are_the_keys_of_its_settings() -> None:
-    """But those of a reference; robot and sensor are blocks and texts of a file alone."""
-    keys = {one.alias or name for name, one in ImportSettings.model_fields.items()}
-    keywords = {*kinds.keywords(accelstudy.find_holds)} - {"robot_sigma", "robot_unit", "settings"}
-    assert {name for name in keywords if not name.startswith("reference")} == keys - {
-        "robot", "sensor",
-    }  # fmt: skip
+    """But those of a reference; an old key ends in a line that says what to write."""
+    keywords = {*kinds.keywords(accelstudy.find_holds)} - {"settings"}
+    assert {name for name in keywords if not name.startswith("reference")} == {
+        *ImportSettings.model_fields
+    } - {"sensor", "gravity_sigma"}
     for text, si in (("8g", 8 * STANDARD_GRAVITY), (30, 30.0)):
-        assert ImportSettings.model_validate({"range": text}).full_range == si
-    for before, now in (
-        ({"rate_hz": 50}, {"rate": "50Hz"}), ({"window_s": 2}, {"window": "2s"}),
-        ({"gravity": {"value_mps2": 9.81}}, {"gravity": "9.81 m/s^2"}),
-    ):  # fmt: skip
-        assert ImportSettings(**before) == ImportSettings(**now)
+        assert ImportSettings.model_validate({"range": text}).range == si
+    for old, value, said in (
+        ("rate_hz", 50, "rate_hz: no longer a key; write rate instead"),
+        ("window_s", 2, "window_s: no longer a key; write window instead"),
+        ("robot", {"angle_sigma_mgon": 3}, "robot: no longer a key; write robot_sigma, as 3.2mgon"),
+        ("gravity", {"value_mps2": 9.81}, "gravity: no longer a section; write its value"),
+    ):
+        with pytest.raises(accelstudy.InputError, match=f"^mine.yaml: {said}"):
+            validate(ImportSettings, {old: value}, "mine.yaml")
+    # What accelstudy wrote itself still reads.
+    assert LogLayout.model_validate({"rate_hz": 50}).rate == 50
 
 
 def test_a_message_calls_a_keyword_as_its_user_does() -> None:

@@ -22,13 +22,12 @@ from accelstudy.basics.units import attitude_unit, display_unit, to_attitude, to
 from accelstudy.basics.wording import one_line
 from accelstudy.campaign.calibration.sensor_calibration import (
     FORCES,
-    KNOWN,
     RANGE_MARGIN,
     SensorCalibration,
 )
 from accelstudy.campaign.gross_errors.recognition import check_size
-from accelstudy.campaign.importing.columns import AXES, CONDITIONS
-from accelstudy.campaign.importing.log import AnyLog, Log, open_log
+from accelstudy.campaign.importing.columns import AXES
+from accelstudy.campaign.importing.log import AnyLog, Log, read_log
 from accelstudy.effects import HoldConditions, course_of_log
 from accelstudy.files.outputs import whole_file
 from accelstudy.files.tables import write_table
@@ -82,8 +81,8 @@ class LeveledLog:
 
     def to_frame(self) -> pd.DataFrame:
         """Return the log with the added columns; a table in memory keeps its index and columns."""
-        frame = self.log.table
-        frame = self.log.source.typed_table().to_pandas() if frame is None else frame
+        raw = self.log.raw
+        frame = raw.table().to_pandas() if raw.frame is None else raw.frame
         return frame.assign(**{str(name): column.array for name, column in self.added.items()})
 
     def tell(self, place: Path) -> None:
@@ -94,8 +93,7 @@ class LeveledLog:
 
     def write(self, out: str | Path, place: Path | None = None) -> None:
         """Write the log with the added columns, CSV or Parquet; if that fails, there is no file."""
-        source = self.log.source
-        table = source.typed_table() if _is_parquet(out) else source.table
+        table = self.log.raw.table(as_written=not _is_parquet(out))
         added = pa.Table.from_pandas(self.added, preserve_index=False)
         columns = {each: own[each] for own in (table, added) for each in own.column_names}
         # The row labels that pandas writes as a column are not part of the log.
@@ -194,12 +192,8 @@ def _warnings(
 
 
 def _read(calibration: SensorCalibration, log: AnyLog, given: Mapping[str, Any]) -> Log:
-    """Open a log, and check that it has what the effects need."""
-    needed = {condition for _, condition in calibration.model.needs}
-    ranged = {key for key in CONDITIONS if KNOWN[key] in calibration.ranges}
-    read = open_log(log, given, like=calibration.usual_layout, untimed=True)
-    asked = {*needed, *ranged, *read.given.get("columns", ())}
-    read = replace(read, wanted=[key for key in OPTIONS if key in asked])
+    """Read a log, and check that it has what the effects need."""
+    read = read_log(log, given, calibration.usual_layout)
     known = {*read.conditions, *(["time"] if read.timed else [])}
     for effect, condition in calibration.model.needs:
         if condition in known or condition.startswith("step_"):
@@ -285,7 +279,7 @@ def _reason(calibration: SensorCalibration, log: Log, row: int) -> str:
     lost = [key for key in log.lacking(row) if key in needed]
     if lost:
         return log.describe(row, lost[0])
-    where, _ = log.source.look_up(row, log.places["fx"])
+    where, _ = log.raw.look_up(row, log.places["fx"])
     full = calibration.document.range_mps2
     end = "" if full is None else f", or it is at the end of the range, ± {full:.4g} m/s²"
     return f"{where}: the calibration has no force for such a reading{end}"

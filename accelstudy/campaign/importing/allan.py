@@ -40,13 +40,12 @@ class AllanDeviation:
         """Root mean square over the channels, (k,)."""
         return np.sqrt(np.mean(self.deviation**2, axis=1))
 
-    def channels(self, chosen: slice) -> AllanDeviation:
-        """Curve of some of the channels."""
-        return AllanDeviation(self.tau, self.deviation[:, chosen], self.differences)
-
 
 def pooled_deviation(
-    records: Sequence[Array], step: float, frames: Sequence[Array] | None = None
+    records: Sequence[Array],
+    step: float,
+    frames: Sequence[Array] | Array | None = None,
+    least: float = 1,
 ) -> AllanDeviation:
     """Allan deviation of all records of one sensor together; records may be short.
 
@@ -57,23 +56,24 @@ def pooled_deviation(
     ----------
     records : sequence of (n, c) arrays without gaps
     step : float, s, between samples
-    frames : sequence of (c, c) arrays, optional
+    frames : sequence of (c, d) arrays, optional
         For each record, to the columns of which its channels are turned.
+    least : float, samples of the shortest averaging time
     """
-    arrays = [np.asarray(record, dtype=float).reshape(len(record), -1) for record in records]
-    lengths = np.array([len(record) for record in arrays])
-    factors = np.array(averaging_factors(lengths.max() // 2), dtype=int)
-    squares = np.zeros((len(factors), arrays[0].shape[1]))
-    one, two = np.empty((2, lengths.max() + 1))
-    for i, record in enumerate(arrays):
+    lengths = np.array([len(record) for record in records])
+    factors = np.array([m for m in averaging_factors(lengths.max() // 2) if m >= least], dtype=int)
+    channels = records[0].shape[1] if frames is None else frames[0].shape[1]
+    squares = np.zeros((len(factors), channels))
+    for i, record in enumerate(records):
         centred = record - record.mean(axis=0)
         centred[:, (record == record[:1]).all(axis=0)] = 0.0  # not what rounding the mean leaves
         turned = centred if frames is None else centred @ frames[i]
         for channel, values in enumerate(turned.T):
             sums = np.concatenate([[0.0], np.cumsum(values)])
             for at, m in enumerate(factors[2 * factors <= len(values)]):
-                first = np.subtract(sums[m:], sums[:-m], out=one[: len(sums) - m])
-                second = np.subtract(first[m:], first[:-m], out=two[: len(first) - m])
+                first = sums[m:] - sums[:-m]
+                second = first[m:] - first[:-m]
+                # BLAS would divide such short sums between threads that wait for each other.
                 squares[at, channel] += np.einsum("i,i", second, second) / (2.0 * m**2)
     fits = lengths[:, None] >= 2 * factors
     terms = np.sum(fits * (lengths[:, None] + 1 - 2 * factors), axis=0)

@@ -18,9 +18,7 @@ import pyarrow as pa
 from numpy.typing import NDArray
 
 from accelstudy.basics.errors import InputError
-from accelstudy.basics.wording import one_line
-from accelstudy.campaign.importing.sources import Source, chosen_of
-from accelstudy.files.reading import readable
+from accelstudy.campaign.importing.raw_table import RawTable, choose, unless_damaged
 
 if TYPE_CHECKING:
     from rosbags.highlevel import AnyReader
@@ -41,7 +39,7 @@ _LONGEST_GAP = 3600.0  # s
 _FIELDS = {"fx": "x", "fy": "y", "fz": "z", "temperature": "temperature"}
 
 
-def open_bag(path: Path, topic: str | None = None) -> Source:
+def read_bag(path: Path, topic: str | None = None) -> RawTable:
     """Read the forces of a bag; their frame is flu, or frd where its name ends in _ned (REP 103).
 
     Parameters
@@ -57,26 +55,20 @@ def open_bag(path: Path, topic: str | None = None) -> Source:
     with _needed_for(path, "a bag of ROS", "rosbags", "ros"):
         from rosbags.highlevel import AnyReader
         from rosbags.typesys import Stores, get_typestore
-    within = path.parent if path.suffix in (".db3", ".mcap") else path
-    if path.suffix in (".db3", ".mcap") and not (within / BAG_OF_FOLDER).is_file():
-        raise InputError(f"{path}: a bag of ROS 2 is a folder; {BAG_OF_FOLDER} is missing here")
-    try:
-        with (
-            readable(path),
-            AnyReader([within], default_typestore=get_typestore(Stores.ROS2_HUMBLE)) as reader,
-        ):
-            topics = {c.topic: c for c in reader.connections if c.msgtype == _IMU}
-            name = chosen_of(path, "topic of sensor_msgs/Imu", topics, topic)
-            imu = [c for c in reader.connections if c.topic == name]
-            frame = next((each.header.frame_id for _, each in _messages(reader, imu)), "")
-            rows = _rows(reader, imu, 4, attrgetter(*_BAG_COLUMNS.values()))
-            expected = sum(connection.msgcount for connection in imu)
-            heat = _thermometer(reader, name)
-            measured = _rows(reader, heat, 2, lambda each: (each.temperature,))
-    except InputError:
-        raise
-    except Exception as error:  # a damaged file fails in many ways
-        raise InputError(f"{path}: not a whole bag ({one_line(error)})") from None
+    folder = path
+    if path.suffix in (".db3", ".mcap"):
+        folder = path.parent
+        if not (folder / BAG_OF_FOLDER).is_file():
+            raise InputError(f"{path}: a bag of ROS 2 is a folder; {BAG_OF_FOLDER} is missing here")
+    store = get_typestore(Stores.ROS2_HUMBLE)
+    with unless_damaged(path, "bag"), AnyReader([folder], default_typestore=store) as reader:
+        topics = {c.topic: c for c in reader.connections if c.msgtype == _IMU}
+        name = choose(path, "topic of sensor_msgs/Imu", topics, topic)
+        imu = [c for c in reader.connections if c.topic == name]
+        frame = next((message.header.frame_id for _, message in _messages(reader, imu)), "")
+        rows = _rows(reader, imu, 4, attrgetter(*_BAG_COLUMNS.values()))
+        expected = sum(connection.msgcount for connection in imu)
+        temperatures = _rows(reader, _thermometer(reader, name), 2, lambda m: (m.temperature,))
     warnings = []
     if len(rows) < expected:
         end = rows[-1, 0] - rows[0, 0] if len(rows) else 0.0
@@ -85,29 +77,28 @@ def open_bag(path: Path, topic: str | None = None) -> Source:
             f"there, up to {end:.1f} s"
         )
     columns = dict(_BAG_COLUMNS)
-    if len(measured):
-        rows = np.column_stack([rows, np.interp(rows[:, 0], *measured.T)])
+    if len(temperatures):
+        rows = np.column_stack([rows, np.interp(rows[:, 0], *temperatures.T)])
         columns["temperature"] = "temperature"
-    return _source(path, rows, columns, "frd" if frame.endswith("_ned") else "flu", warnings)
+    return _table(path, rows, columns, "frd" if frame.endswith("_ned") else "flu", warnings)
 
 
-def _source(
+def _table(
     path: Path, rows: Array, columns: Mapping[str, str], frame: str, warnings: Sequence[str]
-) -> Source:
+) -> RawTable:
     """Times, s, forces, m/s², and perhaps temperatures as a table."""
-    si = {"unit": "m/s^2", "time_unit": "s"}
-    layout = {"columns": columns, "time": "time", "frame": frame, **si}
-    table = dict(zip(("time", *columns.values()), rows.T, strict=True))
-    return Source(path, pa.table(table), layout, warnings=warnings)
+    units = {"unit": "m/s^2", "time_unit": "s"}
+    layout = {"columns": columns, "time": "time", "frame": frame, **units}
+    content = dict(zip(("time", *columns.values()), rows.T, strict=True))
+    return RawTable(path, pa.table(content), layout, warnings=warnings)
 
 
 def _messages(reader: AnyReader, connections: Sequence[Connection]) -> Iterator[tuple[float, Any]]:
     """Messages with their times, s: their stamps, or when they were recorded if these are empty."""
-    for connection, received, raw in reader.messages(connections):
+    for connection, received, raw in reader.messages(connections) if connections else ():
         message: Any = reader.deserialize(raw, connection.msgtype)
         stamp = message.header.stamp
-        nanoseconds = stamp.sec * 10**9 + stamp.nanosec or received
-        yield 1e-9 * nanoseconds, message
+        yield 1e-9 * (stamp.sec * 10**9 + stamp.nanosec or received), message
 
 
 def _rows(
@@ -116,29 +107,25 @@ def _rows(
     width: int,
     values: Callable[[Any], tuple[float, ...]],
 ) -> Array:
-    """Times, s, and values of messages, (n, width); no rows of a topic that is not there."""
-
-    def whole() -> Iterator[tuple[float, ...]]:
-        count = 0
-        try:
-            for time, message in _messages(reader, connections) if connections else ():
-                yield time, *values(message)
-                count += 1
-        except Exception:  # where a bag is damaged; it has messages up to there
-            if not count:
-                raise
-
-    return np.fromiter(whole(), np.dtype((float, width)))
+    """Times, s, and values of messages, (n, width), up to where a bag is damaged."""
+    rows: list[tuple[float, ...]] = []
+    try:
+        for time, message in _messages(reader, connections):
+            rows.append((time, *values(message)))
+    except Exception:
+        if not rows:
+            raise
+    return np.array(rows, dtype=float).reshape(-1, width)
 
 
 def _thermometer(reader: AnyReader, topic: str) -> list[Connection]:
     """The only topic of a temperature, or the only one beside the topic of the forces."""
-    found = [c for c in reader.connections if c.msgtype == _TEMPERATURE]
-    beside = [c for c in found if c.topic.rpartition("/")[0] == topic.rpartition("/")[0]]
-    return next((some for some in (found, beside) if len({c.topic for c in some}) == 1), [])
+    every = [c for c in reader.connections if c.msgtype == _TEMPERATURE]
+    beside = [c for c in every if c.topic.rpartition("/")[0] == topic.rpartition("/")[0]]
+    return next((some for some in (every, beside) if len({c.topic for c in some}) == 1), [])
 
 
-def open_ulog(path: Path, instance: str | None = None) -> Source:
+def read_ulog(path: Path, instance: str | None = None) -> RawTable:
     """Read the forces of a flight log.
 
     Parameters
@@ -154,16 +141,15 @@ def open_ulog(path: Path, instance: str | None = None) -> Source:
     with _needed_for(path, "a flight log of PX4", "pyulog", "px4"):
         from pyulog import ULog
 
-    try:
-        # It prints what it thinks of a file.
-        with readable(path), _ToTheEnd(FileIO(path)) as file, redirect_stdout(StringIO()):
-            log = ULog(file, [_SENSOR])
-    except InputError:
-        raise
-    except Exception as error:  # a damaged file fails in many ways
-        raise InputError(f"{path}: not a whole flight log ({one_line(error)})") from None
+    # It prints what it thinks of a file.
+    with (
+        unless_damaged(path, "flight log"),
+        _ToTheEnd(FileIO(path)) as file,
+        redirect_stdout(StringIO()),
+    ):
+        log = ULog(file, [_SENSOR])
     sensors = {str(each.multi_id): each.data for each in log.data_list}
-    values = sensors[chosen_of(path, f"instance of {_SENSOR}", sensors, instance)]
+    values = sensors[choose(path, f"instance of {_SENSOR}", sensors, instance)]
     if missing := {"timestamp", *"xyz"} - values.keys():
         raise InputError(f"{path}: {_SENSOR} has no field {min(missing)!r}; it cannot be read")
     # Microseconds since the start of the controller; older logs have only the time of the message.
@@ -184,7 +170,7 @@ def open_ulog(path: Path, instance: str | None = None) -> Source:
             f"the flight log ends early or is damaged: its samples are whole up to {whole:.1f} s, "
             f"and end at {rows[-1, 0] - rows[0, 0]:.1f} s"
         )
-    return _source(path, rows, columns, "frd", warnings)
+    return _table(path, rows, columns, "frd", warnings)
 
 
 class _ToTheEnd(BufferedReader):

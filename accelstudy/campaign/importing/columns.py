@@ -1,7 +1,7 @@
 """Which columns of a table are those of a log, and in which units they are.
 
 Loggers write a unit in brackets ("Acc X [g]"), as an ending ("time_ms") or in a row of its own,
-which `read_text` puts in brackets behind the names.
+which `TextTable` puts in brackets behind the names.
 """
 
 from __future__ import annotations
@@ -12,20 +12,21 @@ from typing import TYPE_CHECKING, Any
 
 from accelstudy.basics.errors import InputError, UnknownNameError
 from accelstudy.basics.units import CLOCK_UNITS, SENSOR_UNITS
-from accelstudy.basics.wording import short_list
+from accelstudy.basics.wording import comma_list, short_list
 from accelstudy.campaign.header import LogLayout, Place
 from accelstudy.campaign.unit_spellings import parse_unit
 from accelstudy.files.reading import overlay
 
 if TYPE_CHECKING:
-    from accelstudy.campaign.importing.sources import Source
+    from accelstudy.campaign.importing.raw_table import RawTable
 
 AXES = ("fx", "fy", "fz")
 SDS = ("sd_fx", "sd_fy", "sd_fz")
 CONDITIONS = ("temperature", "vibration")
 """Columns of a log besides time and forces."""
-ORDINARY = ("time", *CONDITIONS)
-"""What is looked for in a log beside the forces."""
+ANGLES = ("roll", "pitch", "yaw")
+MEANS = ("n_samples", *SDS, *ANGLES)
+"""Columns that a table of means may have besides those of a log."""
 _NANOSECONDS = re.compile(r"(.*?)n(ano)?(secs?)", re.IGNORECASE)
 """Whole seconds of a stamp of ROS, where there is no other time, and the rest of it."""
 
@@ -41,7 +42,7 @@ _USUAL = {
     "temperature": r"_?(field_)?(temp|temperature)",
     "vibration": r"vibration|vibration_mps2",
     "n_samples": r"n|n_samples|count",
-    **{angle: rf"{angle}|{angle}_robot(_gon)?" for angle in ("roll", "pitch", "yaw")},
+    **{angle: rf"{angle}|{angle}_robot(_gon)?" for angle in ANGLES},
 }
 _LESS_USUAL = {
     "time": r"t|(.*_)?secs?|(date|sample|sensor|log)_?time|date|elapsed(_time)?",
@@ -58,11 +59,10 @@ _AS_ENDING = re.compile(r"(.*[^\W_])[\s_]+([^\W_]+([_/^-]\w+)?)")
 
 
 def resolve_layout(
-    source: Source,
+    raw: RawTable,
     given: Mapping[str, Any],
     like: LogLayout | None = None,
-    wanted: Collection[str] = ORDINARY,
-    untimed: bool = False,
+    more: Collection[str] = (),
 ) -> tuple[LogLayout, dict[str, int]]:
     """Find out how a log is laid out.
 
@@ -72,31 +72,37 @@ def resolve_layout(
 
     Parameters
     ----------
-    source : Source
+    raw : RawTable
     given : mapping, keys of `LogLayout` that were said
     like : LogLayout, how another log of the sensor was read
-    wanted : what to look for beside the forces; columns of a table of means as well
-    untimed : bool, whether a log may have neither a time nor a rate
+    more : keys that are looked for besides those of a log, as of a table of means
 
     Returns
     -------
-    layout : LogLayout
+    layout : LogLayout, with all columns that were found, by name if they have one of their own
     places : dict of places of columns: of "fx", "fy", "fz" and perhaps "time", "nanoseconds" (to be
-        added to a time in whole seconds) and what is wanted
+        added to a time in whole seconds), conditions, and `more`
 
     Raises
     ------
     InputError
-        If the table lacks a column.
+        If the table lacks a force.
     """
-    if {"time", "rate_hz"} <= given.keys():
-        raise InputError(f"{source}: give the rate or the column of time, not both")
-    another = like is None or like.columns.get("fx") not in source.names
-    of_format = source.layout if another else {}
-    told = {k: v for k, v in of_format.items() if k != "time" or "rate_hz" not in given}
-    chosen = _laid_over(like, overlay(told, given))
+    if {"time", "rate"} <= given.keys():
+        raise InputError(f"{raw.path}: give the rate or the column of time, not both")
+    another = like is None or like.columns.get("fx") not in raw.names
+    told = {**layout_by_names(raw.names), **raw.layout} if another else {}
+    if raw.frame is not None:
+        told |= raw.layout  # the times of its index
+    chosen = _overlaid(like, told, given)
+    columns = chosen.columns | ({} if chosen.time is None else {"time": chosen.time})
+    wanted = (*AXES, *(("time",) if chosen.rate is None else ()), *CONDITIONS, *more)
+    for name in chosen.columns:
+        if name not in (*AXES, *CONDITIONS, *more):
+            known = (*AXES, *CONDITIONS, *more)
+            raise UnknownNameError("column", name, known)
     try:
-        places = _places(source, chosen, given, wanted, untimed)
+        places = _find_places(raw, columns, {*given, *given.get("columns", ())}, wanted)
     except InputError as error:
         if like is None or "columns" in given:
             raise
@@ -105,81 +111,73 @@ def resolve_layout(
             "change them"
         ) from None
     if another:
-        scaled = {"unit": "counts"} if given.keys() & {"scale", "offset"} else {}
-        told = {**scaled, **_units(source, places), **told}
-    return _laid_over(like, overlay(told, given)), places
+        chosen = _overlaid(like, {**_units(raw, places, given), **told}, given)
+    by_name = {
+        key: raw.names[i] if raw.named and raw.names.count(raw.names[i]) == 1 else i
+        for key, i in places.items()
+        if key != "nanoseconds"
+    }
+    found = {"time": by_name.pop("time", None), "columns": by_name}
+    return chosen.model_copy(update=found), places
 
 
-def _laid_over(like: LogLayout | None, given: Mapping[str, Any]) -> LogLayout:
-    """Layout of another log overlaid with what is given of this one.
+def _overlaid(
+    like: LogLayout | None, told: Mapping[str, Any], given: Mapping[str, Any]
+) -> LogLayout:
+    """Layout of another log overlaid with what a log tells and what is given of it.
 
-    If all three columns of the forces are given, they replace all others, since then the log is
+    If all three columns of the forces are known, they replace all others, since then the log is
     another one. A column of time replaces a rate, and a unit the scale of counts.
     """
-    below = {} if like is None else like.model_dump(exclude_none=True)
-    replaced = {"time", "rate_hz"} if given.keys() & {"time", "rate_hz"} else set()
-    if given.get("unit", "counts") != "counts":
-        replaced |= {"scale", "offset"}
-    if {*AXES} <= given.get("columns", {}).keys():
-        replaced |= {"columns"}
-    kept = {key: value for key, value in below.items() if key not in replaced}
-    return LogLayout.model_validate(overlay(kept, given))
+    layout = {} if like is None else like.model_dump(exclude_none=True)
+    for layer in (told, given):
+        replaced = {"time", "rate"} if layer.keys() & {"time", "rate"} else set()
+        if layer.get("unit", "counts") != "counts":
+            replaced |= {"scale", "offset"}
+        if {*AXES} <= layer.get("columns", {}).keys():
+            replaced |= {"columns"}
+        layout = overlay({k: v for k, v in layout.items() if k not in replaced}, layer)
+    return LogLayout.model_validate(layout)
 
 
-def _places(
-    source: Source,
-    layout: LogLayout,
-    given: Mapping[str, Any],
-    wanted: Collection[str],
-    untimed: bool,
+def _find_places(
+    raw: RawTable, columns: Mapping[str, Place], said: Collection[str], wanted: Collection[str]
 ) -> dict[str, int]:
     """Places of the columns of a log; those of another log of the sensor may be missing."""
-    known = dict.fromkeys((*AXES, *CONDITIONS, *wanted))
-    for key in layout.columns:
-        if key not in known:
-            raise UnknownNameError("column", key, [each for each in known if each != "time"])
-    columns = layout.columns | ({} if layout.time is None else {"time": layout.time})
-    known_axes = [k for k in AXES if find_column(source, k, columns.get(k)) is not None]
-    if len(source.names) == 3 and not known_axes:
-        columns |= dict(zip(AXES, range(3), strict=True))
-    said = given.keys() | given.get("columns", {}).keys()
-    needed = {*AXES, *(() if untimed or layout.rate_hz is not None else ("time",))}
+    if len(raw.names) == 3 and not any(_find(raw, k, columns.get(k)) is not None for k in AXES):
+        columns = {**columns, **dict(zip(AXES, range(3), strict=True))}
     places: dict[str, int] = {}
-    for key in (*AXES, *wanted):
-        if key == "time" and layout.rate_hz is not None:
-            continue
+    for key in wanted:
         try:
-            place = find_column(source, key, columns.get(key))
-            if place is None and key in needed:
-                how = "" if key == "time" else f"; give `columns` {key}=NAME, or its number"
-                raise InputError(
-                    f"{source}: which column is {key}? The columns are "
-                    f"{short_list(source.names) or 'none'}, counted from 0{how}"
-                )
-        except InputError as error:
+            place = _find(raw, key, columns.get(key))
+        except InputError:
             if key in said or key in AXES:
                 raise
-            if key in needed:
-                raise InputError(
-                    f"{error}; give the column of time (`time`), or the rate (`rate`), or, for a "
-                    "log without the moves between positions, the samples of each (`block`)"
-                ) from None
             continue
+        if place is None and key in AXES:
+            raise InputError(f"{which_column(raw, key)}; give `columns` {key}=NAME, or its number")
         by_name = key not in columns and key not in (*AXES, "time")
         if place is not None and not (by_name and place in places.values()):
             places[key] = place
-    if len({*places.values()}) < len(places):
-        raise InputError(f"{source}: two of {', '.join(places)} name the same column")
+    for place in places.values():
+        if len(keys := [key for key, other in places.items() if other == place]) > 1:
+            raise InputError(f"{raw.path}: {comma_list(keys)} name the same column")
     if "time" in places:  # in whole seconds, "stamp.secs", it has a column of ns, "stamp.nsecs"
-        parts = ((i, _NANOSECONDS.fullmatch(name)) for i, name in enumerate(source.names))
-        whole = source.names[places["time"]]
+        parts = ((i, _NANOSECONDS.fullmatch(name)) for i, name in enumerate(raw.names))
+        whole = raw.names[places["time"]]
         rest = [i for i, part in parts if part and part[1] + part[3] == whole]
         if len(rest) == 1:
             places["nanoseconds"] = rest[0]
     return places
 
 
-def find_column(source: Source, key: str, column: Place | None = None) -> int | None:
+def which_column(raw: RawTable, key: str) -> str:
+    """Ask which column is that of a key."""
+    there = short_list(raw.names) or "none"
+    return f"{raw.path}: which column is {key}? The columns are {there}, counted from 0"
+
+
+def _find(raw: RawTable, key: str, column: Place | None = None) -> int | None:
     """Place of the column of a key: as given, or by its usual names; None if no name tells it.
 
     Digits are a place, unless a column has them as its name.
@@ -187,42 +185,37 @@ def find_column(source: Source, key: str, column: Place | None = None) -> int | 
     Raises
     ------
     InputError
-        If the column that is given does not exist, or has dates instead of numbers.
+        If the column that is given does not exist.
     """
-    names = source.names
+    names, by_text = raw.names, raw.named and isinstance(column, str)
     if column is None:
-        found = places_by_name(names, key) or ([*source.dates] if key == "time" else [])
-    elif source.named and isinstance(column, str) and column in names:
-        if names.count(column) > 1:
-            raise InputError(f"{source}: {key}: there are several columns {column!r}")
-        found = [names.index(column)]
+        places = places_by_name(names, key) or (sorted(raw.dates) if key == "time" else [])
+    elif by_text and column in names:
+        if names.count(str(column)) > 1:
+            raise InputError(f"{raw.path}: {key}: there are several columns {column!r}")
+        places = [names.index(str(column))]
     else:
         # A unit in brackets belongs to the column, and may be in one of the names only.
         plain = without_unit(str(column))
-        found = [i for i, name in enumerate(names) if without_unit(name) == plain]
-        if not (source.named and isinstance(column, str) and len(found) == 1):
+        places = [i for i, name in enumerate(names) if without_unit(name) == plain]
+        if not (by_text and len(places) == 1):
             if not re.fullmatch(r"[0-9]{1,9}", str(column)) or int(column) >= len(names):
                 raise InputError(
-                    f"{source}: {key}: no column {column!r}; there are {short_list(names)}, "
+                    f"{raw.path}: {key}: no column {column!r}; there are {short_list(names)}, "
                     "counted from 0"
                 )
-            found = [int(column)]
-    if len(found) != 1:
-        return None
-    if found[0] in source.dates and key != "time":
-        name = names[found[0]]
-        raise InputError(f"{source}: column {name} is timestamps, not numbers ({key})")
-    return found[0]
+            places = [int(column)]
+    return places[0] if len(places) == 1 else None
 
 
-def _units(source: Source, places: Mapping[str, int]) -> dict[str, str]:
-    """Units of the forces and of the time, as far as the names of their columns tell them."""
-    units: dict[str, str] = {}
-    of_axes = {unit_in(source.names[places[axis]], axis) for axis in AXES}
+def _units(raw: RawTable, places: Mapping[str, int], given: Mapping[str, Any]) -> dict[str, str]:
+    """Units of forces and time, as far as names or a scale of counts tell them."""
+    units: dict[str, str] = {"unit": "counts"} if given.keys() & {"scale", "offset"} else {}
+    of_axes = {unit_in(raw.names[places[axis]], axis) for axis in AXES}
     if len(of_axes) == 1 and (unit := of_axes.pop()) in SENSOR_UNITS:
         units["unit"] = unit
-    dated = "nanoseconds" in places or places.get("time") in source.dates
-    if "time" in places and not dated and (unit := unit_in(source.names[places["time"]], "time")):
+    dated = "nanoseconds" in places or places.get("time") in raw.dates
+    if "time" in places and not dated and (unit := unit_in(raw.names[places["time"]], "time")):
         units["time_unit"] = unit
     return units
 
@@ -252,7 +245,7 @@ def unit_in(name: str, key: str) -> str | None:
 def places_by_name(names: Sequence[str], key: str) -> list[int]:
     """Places of the columns that may be the one of a key: one, if the names tell it."""
     found: list[int] = []
-    for pattern in filter(None, (_USUAL.get(key, re.escape(key)), _LESS_USUAL.get(key))):
+    for pattern in filter(None, (_USUAL.get(key), _LESS_USUAL.get(key))):
         matches = re.compile(pattern).fullmatch
         found = [i for i, name in enumerate(names) if _is_of(name, key, matches)]
         if len(found) == 1:

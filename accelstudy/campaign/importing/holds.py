@@ -1,15 +1,18 @@
 """Static holds of a log: runs of samples at rest, or blocks of which each is a position.
 
-A hold is a run of samples about which the windows are at rest.
+The detector is that of Tedaldi, Pretto and Menegatti (ICRA 2014): a hold is a run of samples about
+which the windows are at rest. It compares the norm of the variances of the three axes in a window
+with a threshold, which comes from the data.
 """
 
 from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from itertools import pairwise
 from statistics import NormalDist
+from typing import NamedTuple
 
 import numpy as np
 import pandas as pd
@@ -18,26 +21,33 @@ from numpy.typing import NDArray
 from accelstudy.basics.errors import InputError
 from accelstudy.basics.units import STANDARD_GRAVITY
 from accelstudy.basics.wording import plural, short_list
-from accelstudy.campaign.importing.allan import MIN_DIFFERENCES
+from accelstudy.campaign.importing.allan import MIN_DIFFERENCES, pooled_deviation
 from accelstudy.campaign.importing.columns import AXES, SDS
+from accelstudy.campaign.importing.log import GAP_RATIO, Log
 from accelstudy.campaign.importing.noise import (
     HoldNoise,
     hold_noise,
     noise_before_rounding,
+    step_in,
 )
-from accelstudy.campaign.importing.recording import Recording
 from accelstudy.campaign.importing.settings import ImportSettings
-from accelstudy.campaign.importing.windows import (
-    MAX_REST_NOISE,
-    THRESHOLD_FACTOR,
-    Threshold,
-    Windows,
-    usual_window,
-)
 from accelstudy.leveling.angles import usual_norm
 
 Array = NDArray[np.float64]
 
+MIN_SAMPLES, MAX_SAMPLES = 8, 10**6
+"""Samples of a window, at least and at most."""
+THRESHOLD_FACTOR = 3.0
+"""Threshold over noise floor; it leaves room for noise that differs between attitudes."""
+QUIET_FACTOR, QUIET = 10.0, 0.003 * STANDARD_GRAVITY
+"""The same for a quiet sensor, and the largest threshold that it may give, m/s²."""
+MAX_REST_NOISE = 0.02
+"""Noise of windows, as a share of gravity, from which on it may be motion and not the sensor's."""
+MAX_COARSE_RATIO = 1.75
+"""Noise of windows, as a multiple of that of rounding, up to which a sensor at rest may read the
+same number all the time: that of noise of 0.4 steps."""
+_DECADES, _PER_DECADE = 40, 50
+"""Bins of the histogram of variances: decades on both sides of 1 (m/s²)², and bins of each."""
 MAX_SATURATED_SHARE = 0.05
 """A hold is useless if more than this share of its samples is at the end of the scale."""
 MAX_BEYOND, MIN_WITHIN = 5.0, 3.0
@@ -65,28 +75,24 @@ class Holds:
 
     Attributes
     ----------
-    windows : Windows, of the log
-    threshold : Threshold
-    table : DataFrame, a row for each hold, by the number that figures and options use; see
-        `hold_table`
-    left_out : mapping of int to str, numbers of holds that are left out, with the reason
+    log : Log, joined
+    windows : Windows of the log
+    table : DataFrame, a row for each hold, by the number that figures and options use: start and
+        end (first sample, and the one after the last), t0 and t1 (times of the first and of the
+        last sample, s), n (samples), fx … (means, m/s²), sd_fx … (standard deviations of the
+        samples), as far as the log has them the mean temperature, °C, and the rms vibration, m/s²
+        (NaN where nothing was measured), and left_out, why a hold is left out, or ""
     noise : HoldNoise, of the holds that are not left out
     warnings : tuple of str
     size : int, samples of each block, or of the shortest, if the log consists of blocks
     """
 
+    log: Log
     windows: Windows
-    threshold: Threshold
     table: pd.DataFrame
-    left_out: Mapping[int, str]
     noise: HoldNoise
     warnings: tuple[str, ...]
     size: int | None = None
-
-    @property
-    def log(self) -> Recording:
-        """The log."""
-        return self.windows.log
 
     @property
     def means(self) -> Array:
@@ -99,34 +105,175 @@ class Holds:
         return usual_norm(self.means - self.noise.center)
 
     @property
-    def are_used(self) -> NDArray[np.bool_]:
+    def used(self) -> NDArray[np.bool_]:
         """Which of them are not left out, (n,)."""
-        return ~self.table.index.isin([*self.left_out])
+        return (self.table["left_out"] == "").to_numpy()
 
-    def without(self, reasons: Mapping[int, str]) -> Holds:
-        """Return the others, as if these had not been found, with warnings that say why."""
-        return replace(
-            self,
-            table=self.table.drop(index=[*reasons]),
-            left_out={n: why for n, why in self.left_out.items() if n not in reasons},
-            warnings=(*self.warnings, *(f"hold {n} left out: {why}" for n, why in reasons.items())),
+    @property
+    def left_out(self) -> dict[int, str]:
+        """Numbers of the others, with the reason."""
+        reasons = self.table["left_out"]
+        return dict(zip(reasons.index[~self.used].tolist(), reasons[~self.used], strict=True))
+
+
+# --- Windows -------------------------------------------------------------------------------------
+
+
+class Windows(NamedTuple):
+    """Windows that slide over the samples of a log by one sample; none spans a gap.
+
+    A channel that does not change in a window is frozen, unless the steps in which it is read
+    explain it: then no window has less noise than that of rounding.
+
+    Attributes
+    ----------
+    width : int, samples of a window; odd
+    variance : (n,) array, (m/s²)², norm of the variances of the axes in the window about each
+        sample; NaN about those too near to a gap or an end for a window, and if it is frozen
+    about : slice or (n,) bool array, samples about which there is a window
+    steps : (3,) array, m/s², in which the axes are read; 0 where there are none
+    warnings : list of str
+    threshold : float, m/s²; a window with at most this standard deviation (the root of the norm of
+        the variances of its axes) is at rest
+    floor : float, m/s², standard deviation of the noise by the same measure; NaN if not needed
+    reason : str, how the threshold was chosen
+    """
+
+    width: int
+    variance: Array
+    about: slice | NDArray[np.bool_]
+    steps: Array
+    warnings: list[str]
+    threshold: float = np.nan
+    floor: float = np.nan
+    reason: str = ""
+
+
+def usual_window(log: Log) -> float:
+    """Length of a window, s: 1 s, or 9 samples of a slow log if its unit of time is plausible."""
+    return 1.0 if log.unit_hint() else max(1.0, (MIN_SAMPLES + 1) * log.step)
+
+
+def windows_at_rest(log: Log, seconds: float | None = None, given: float | None = None) -> Windows:
+    """Windows of a length in s, with the threshold, m/s², that separates rest from motion.
+
+    Unless it is given it is a multiple of the noise floor: 3, since noise differs between
+    attitudes; up to 10 as long as it is below 0.003 g. A quiet sensor feels footsteps and pumps,
+    and whatever moves less than that in a second is not being turned.
+
+    Raises
+    ------
+    InputError
+        If the samples of a window are too few for a variance, or so many that the rate must be
+        wrong, or a channel is frozen.
+    """
+    window = seconds or usual_window(log)
+    samples = window / log.step
+    if not MIN_SAMPLES <= samples <= MAX_SAMPLES:
+        raise InputError(
+            f"{log.path}: a window of {window:g} s holds {samples:.3g} samples, at "
+            f"{1 / log.step:.6g} per second{log.unit_hint() or '; is the rate (`rate`) right?'}"
         )
+    windows = slide_windows(log, round(samples) | 1)
+    if given is not None:
+        return windows._replace(threshold=given, reason="as given")
+    floor = _noise_floor(windows.variance)
+    if not np.isfinite(floor):
+        raise InputError(f"{log.path}: a channel does not change in any window; is it frozen?")
+    threshold = max(THRESHOLD_FACTOR * floor, min(QUIET_FACTOR * floor, QUIET))
+    reason = f"{threshold / floor:.3g} times the noise floor of {floor:.3g} m/s²"
+    reason += ", the sd of most windows at rest"
+    return windows._replace(threshold=threshold, floor=floor, reason=reason)
+
+
+def slide_windows(log: Log, width: int) -> Windows:
+    """Windows of so many samples; raises `InputError` if the log is too short for one."""
+    half, part = width // 2, log.part
+    piece = np.cumsum((np.diff(log.time) > GAP_RATIO * log.step) | (np.diff(part) > 0))
+    gaps = int(piece[-1]) - int(part[-1])
+    variance, frozen = window_variance(log.forces, width)
+    if piece[-1]:
+        piece = np.concatenate([[0], piece])
+        variance[half : len(piece) - half][piece[2 * half :] != piece[: -2 * half]] = np.nan
+    covered = np.isfinite(variance)
+    if not covered.any():
+        raise InputError(
+            f"{log.path}: too few samples for a window of {width}, or gaps all over"
+            f"{log.unit_hint()}"
+        )
+    # A part of an array is no copy of it.
+    whole = slice(half, len(covered) - half)
+    about = whole if covered[whole].all() else covered
+    steps = np.array([step_in(force[about]) for force in log.forces.T])
+    warnings = [f"{plural(gaps, 'gap')} in time; no hold spans one"] if gaps else []
+    rounding = noise_of_steps(steps)
+    floor = _noise_floor(variance) if rounding else 0.0
+    # If all windows that change are motion, nothing else explains that others do not.
+    if 0 < floor <= MAX_COARSE_RATIO * rounding or floor > MAX_REST_NOISE * STANDARD_GRAVITY:
+        np.maximum(variance, rounding**2, out=variance)
+    elif (share := np.sum(frozen & covered) / covered.sum()) > 0:
+        variance[frozen] = np.nan
+        warnings.append(
+            f"a channel does not change over a window in {100 * share:.2g} % of the log; left out"
+        )
+    return Windows(width, variance, about, steps, warnings)
+
+
+def noise_of_steps(steps: Array) -> float:
+    """Noise of a window by rounding alone, m/s²."""
+    return float(np.sqrt(np.linalg.norm(steps**2 / 12)))
+
+
+def window_variance(forces: Array, width: int) -> tuple[Array, NDArray[np.bool_]]:
+    """Norm of the variances of the axes about each sample, (n,), and where an axis is constant."""
+    variance, constant = np.zeros(len(forces)), np.zeros(len(forces), dtype=bool)
+    for force in forces.T:
+        variance += pd.Series(force).rolling(width, center=True).var(ddof=0).to_numpy() ** 2
+        # Rounding may hide a variance of zero, so readings that do not change are counted.
+        same = np.diff(force) == 0
+        if np.count_nonzero(same) >= width - 1:
+            alike = np.concatenate([[0], np.cumsum(same)])
+            still = alike[width - 1 :] - alike[: 1 - width] == width - 1
+            constant[width // 2 : len(force) - width // 2] |= still
+    return np.sqrt(variance), constant
+
+
+def _noise_floor(variance: Array) -> float:
+    """Noise around which windows at rest crowd, m/s²; infinite without a window that changes.
+
+    Otsu's method finds the valley between rest and motion in the histogram of the logarithmic
+    variances: it divides them into two classes with the largest variance between these. At rest
+    they crowd around one value; in motion they spread over decades.
+    """
+    decades = np.log10(variance, where=variance > 0, out=np.full(len(variance), np.nan))
+    bins = 2 * _DECADES * _PER_DECADE
+    counts, edges = np.histogram(decades, bins, (-_DECADES, _DECADES))
+    if not counts.any():
+        return np.inf
+    middle = (edges[:-1] + edges[1:]) / 2
+    below, moment = np.cumsum(counts)[:-1].astype(float), np.cumsum(counts * middle)
+    above = counts.sum() - below
+    # An empty class has no mean, and no weight.
+    low = moment[:-1] / np.maximum(below, 1)
+    high = (moment[-1] - moment[:-1]) / np.maximum(above, 1)
+    between = below * above * (high - low) ** 2
+    best = np.flatnonzero(between >= between.max() * (1 - 1e-9))
+    valley = middle[best[len(best) // 2]] if between.max() > 0 else middle[np.argmax(counts)]
+    quiet = np.where(middle <= valley, counts, 0)
+    # Smoothed over a tenth of a decade, so that a short log with few windows has a peak, too.
+    mode = middle[np.argmax(np.convolve(quiet, np.ones(5), "same"))]
+    crowd = np.where(np.abs(middle - mode) <= np.log10(2), counts, 0)
+    return float(np.sqrt(10.0 ** middle[np.searchsorted(np.cumsum(crowd), crowd.sum() / 2)]))
 
 
 # --- Runs at rest --------------------------------------------------------------------------------
 
 
-def find_holds(log: Recording, settings: ImportSettings, one_each: bool = False) -> Holds:
+def find_holds(log: Log, settings: ImportSettings) -> Holds:
     """Find the static holds of a log, each of which begins and ends half a window inside a rest.
 
-    Rests in which the sensor is saturated, or turns, are left out.
-
-    Parameters
-    ----------
-    log : Recording
-    settings : ImportSettings, of which those of the holds count
-    one_each : bool, whether the log has several recordings with one position each: the longest
-        hold, which gets the number of the recording
+    Rests in which the sensor is saturated, or turns, are left out. Of a log joined of several parts
+    the longest hold of each is its one position, which gets the number of the part.
 
     Raises
     ------
@@ -134,16 +281,15 @@ def find_holds(log: Recording, settings: ImportSettings, one_each: bool = False)
         If the log is shorter than a window, nothing in it is at rest, or the sensor was never
         still.
     """
-    windows = Windows.lasting(log, settings.window_s)
-    threshold = windows.threshold(settings.threshold_mps2)
-    runs, too_short = _runs_at_rest(windows, threshold.sd, settings)
+    windows = windows_at_rest(log, settings.window, settings.threshold)
+    runs, too_short = _runs_at_rest(log, windows, settings)
     # A sensor that turns slowly is nearly still in each window, yet has no constant attitude: its
     # force changes over the run by more than within each of them.
-    turns = [scatter(log.forces[run]) > MAX_WANDER * threshold.sd for run in runs]
+    turns = [scatter(log.forces[run]) > MAX_WANDER * windows.threshold for run in runs]
     reasons = {i: TURNS for i, turning in enumerate(turns) if turning}
-    reasons |= dict.fromkeys(find_saturated(windows, runs, settings.full_range), SATURATED)
+    reasons |= dict.fromkeys(find_saturated(log, windows, runs, settings), SATURATED)
     numbers = dict(enumerate(range(len(runs)), 1))
-    if one_each:
+    if len(log.parts) > 1:
         part, lengths = log.part, [run.stop - run.start for run in runs]
         last_is_best = sorted(range(len(runs)), key=lambda i: (i not in reasons, lengths[i]))
         numbers = dict(sorted({int(part[runs[i].start]) + 1: i for i in last_is_best}.items()))
@@ -153,33 +299,33 @@ def find_holds(log: Recording, settings: ImportSettings, one_each: bool = False)
     warnings = [*windows.warnings, *lost, *too_short]
     if len(left_out) == len(numbers):
         if TURNS in why:
-            raise _never_still(windows, "it turns slowly in all that looks like a hold", settings)
+            raise _never_still(log, windows, "it turns slowly in all that looks like a hold")
         raise InputError(
-            f"{log.path}: no static hold of {settings.shortest_s:g} s or more (a window "
-            f"is at rest up to {threshold.sd:.3g} m/s²)" + "".join(f"; {w}" for w in warnings)
+            f"{log.path}: no static hold of {settings.shortest:g} s or more (a window is at rest "
+            f"up to {windows.threshold:.3g} m/s²)" + "".join(f"; {w}" for w in warnings)
         )
     holds = {n: runs[i] for n, i in numbers.items()}
-    return _holds_of(windows, threshold, holds, warnings, settings, left_out)
+    return _holds_of(log, windows, holds, left_out, settings, warnings)
 
 
 def _runs_at_rest(
-    windows: Windows, limit: float, settings: ImportSettings
+    log: Log, windows: Windows, settings: ImportSettings
 ) -> tuple[list[slice], list[str]]:
-    """Samples that are at rest for long enough, in windows up to an sd in m/s².
+    """Samples that are at rest for long enough.
 
     Also a line about rests that are too short, with the option that takes them.
     """
-    step, shortest = windows.log.step, settings.shortest_s
-    still = windows.variance <= limit**2
+    step, shortest = log.step, settings.shortest
+    still = windows.variance <= windows.threshold**2
     edges = np.flatnonzero(np.diff(still, prepend=False, append=False)).reshape(-1, 2)
-    cut, least = round(settings.trim_s / step), max(2, round(shortest / step))
+    cut, least = round(settings.trim / step), max(2, round(shortest / step))
     rests = edges + np.array([cut, -cut])
     lengths = np.diff(rests)[:, 0]
     runs = [slice(first, end) for first, end in rests[lengths >= least].tolist()]
     short = lengths[(lengths >= MIN_REST) & (lengths < least)]
     if not len(short):
         return runs, []
-    lost = (settings.window_s or usual_window(windows.log)) + 2 * settings.trim_s
+    lost = (settings.window or usual_window(log)) + 2 * settings.trim
     spans = (np.sort(short)[[0, -1]] + 2 * cut + windows.width) * step
     left = (spans[0] - lost) * (1 + 1e-9)
     digit = 10.0 ** np.floor(np.log10(left))
@@ -195,10 +341,10 @@ def _runs_at_rest(
 # --- Blocks --------------------------------------------------------------------------------------
 
 
-def find_blocks(log: Recording, settings: ImportSettings) -> Holds:
+def find_blocks(log: Log, settings: ImportSettings) -> Holds:
     """Make each block of a log a position; those in which the sensor moves are left out.
 
-    The blocks have as many samples as the settings say, or are the files of the log. Nothing has to
+    The blocks have as many samples as the settings say, or are the parts of the log. Nothing has to
     be found in them.
 
     Raises
@@ -208,9 +354,9 @@ def find_blocks(log: Recording, settings: ImportSettings) -> Holds:
     """
     block = log.part
     if (size := settings.block) is not None:
-        row, total = log.samples.index.to_numpy(), len(log.first.lost)
+        row, total = log.samples.index.to_numpy(), len(log.raw.content)
         fewer = total // size * size
-        if len(row) and row[-1] >= fewer:  # a note at the end is no sample
+        if row[-1] >= fewer:  # a note at the end is no sample
             raise InputError(
                 f"{log.path}: {total} samples are no multiple of the {size} of a block (`block`): "
                 f"{fewer} or {fewer + size} would be {fewer // size} or {fewer // size + 1} "
@@ -224,8 +370,8 @@ def find_blocks(log: Recording, settings: ImportSettings) -> Holds:
         raise InputError(f"{log.path}: {least} samples; a position has at least {PARTS}")
     # Blocks of which most is left out are no positions, which the report says.
     blocks = {n: each for n, each in blocks.items() if each.stop - each.start >= PARTS}
-    windows, numbers = Windows(log, (least // 2) | 1), [*blocks]
-    full = find_saturated(windows, [*blocks.values()], settings.full_range)
+    windows, numbers = slide_windows(log, (least // 2) | 1), [*blocks]
+    full = find_saturated(log, windows, [*blocks.values()], settings)
     left_out = {numbers[i]: SATURATED for i in full}
     scatters = {
         n: scatter(np.array([p.mean(axis=0) for p in np.array_split(log.forces[each], PARTS)]))
@@ -234,18 +380,17 @@ def find_blocks(log: Recording, settings: ImportSettings) -> Holds:
     }
     if not scatters:
         raise InputError(f"{log.path}: the sensor is saturated in all blocks of {least} samples")
-    if settings.threshold_mps2:
-        threshold = windows.threshold(settings.threshold_mps2)
-    else:
-        # Rounding hides the scatter of a coarse sensor.
-        hidden = THRESHOLD_FACTOR / MAX_TREMOR * windows.rounding
-        usual = max(float(np.median([*scatters.values()])), hidden)
-        reason = f"{MAX_TREMOR:g} times the scatter of the {PARTS} parts of a typical block"
-        threshold = Threshold(MAX_TREMOR * usual, usual, reason)
+    # Rounding hides the scatter of a coarse sensor.
+    hidden = THRESHOLD_FACTOR / MAX_TREMOR * noise_of_steps(windows.steps)
+    usual = max(float(np.median([*scatters.values()])), hidden)
+    reason = f"{MAX_TREMOR:g} times the scatter of the {PARTS} parts of a typical block"
+    windows = windows._replace(threshold=MAX_TREMOR * usual, floor=usual, reason=reason)
+    if settings.threshold:
+        windows = windows._replace(threshold=settings.threshold, floor=np.nan, reason="as given")
     for number, each in scatters.items():
-        if each > threshold.sd:
+        if each > windows.threshold:
             left_out[number] = f"the sensor moves: its parts scatter by {each:.2g} m/s²"
-    return _holds_of(windows, threshold, blocks, windows.warnings, settings, left_out, least)
+    return _holds_of(log, windows, blocks, left_out, settings, windows.warnings, least)
 
 
 # --- What is no measurement ----------------------------------------------------------------------
@@ -256,31 +401,30 @@ def scatter(forces: Array) -> float:
     return float(np.sqrt(np.linalg.norm(forces.var(axis=0, ddof=1))))
 
 
-def find_saturated(windows: Windows, holds: Sequence[slice], full_range: float) -> list[int]:
+def find_saturated(
+    log: Log, windows: Windows, holds: Sequence[slice], settings: ImportSettings
+) -> list[int]:
     """Find holds with samples at the sensor's range or, if it is unknown, at the extreme.
 
     In a hold of n samples of which none lies beyond the last step, the mean may be so high that
     `MAX_BEYOND` of them were expected there. Those above the last edge but one are as many as the
     step, and the noise before rounding, explain.
 
-    Parameters
-    ----------
-    windows : Windows
-    holds : sequence of slices of the samples of the log
-    full_range : float, m/s², the sensor measures ± this; infinite if unknown
-
     Returns
     -------
     list of int, places of the holds in their sequence
     """
-    forces, step = [windows.log.forces[hold] for hold in holds], windows.steps
-    if np.isfinite(full_range) or not forces:
+    forces, step = [log.forces[hold] for hold in holds], windows.steps
+    # The range of counts is unknown if their offset is.
+    if settings.range is not None and (log.layout.unit, log.layout.offset) != ("counts", None):
         # The largest reading of a converter is a step less than its range.
-        limit = full_range - step.max()
+        limit = settings.range - step.max()
         return [i for i, each in enumerate(forces) if reaches_range(each, limit)]
+    if not forces:
+        return []
     ends, inner = np.empty((2, 2, 3))
-    for axis, force in enumerate(windows.log.forces.T):
-        read = force[windows.centred]
+    for axis, force in enumerate(log.forces.T):
+        read = force[windows.about]
         low, high = ends[:, axis] = read.min(), read.max()
         inner[0, axis] = np.min(read, where=read > low, initial=np.inf)
         inner[1, axis] = np.max(read, where=read < high, initial=-np.inf)
@@ -310,35 +454,13 @@ def reaches_range(forces: Array, full_range: float) -> bool:
 # --- The table of holds --------------------------------------------------------------------------
 
 
-def hold_table(log: Recording, holds: Mapping[int, slice]) -> pd.DataFrame:
-    """Table of holds by their numbers, from the samples of each.
-
-    Its columns are start and end (first sample, and the one after the last), t0 and t1 (times of
-    the first and of the last sample, s), n (samples), fx … (means, m/s²), sd_fx … (standard
-    deviations of the samples), and, as far as the log has them, the mean temperature, °C, and the
-    rms vibration, m/s²; NaN where nothing was measured.
-    """
-    rows = []
-    for hold in holds.values():
-        forces, time = log.forces[hold], log.time[hold]
-        row = {"start": hold.start, "end": hold.stop, "t0": time[0], "t1": time[-1]}
-        row |= {"n": len(forces), **dict(zip(AXES, forces.mean(axis=0), strict=True))}
-        row |= dict(zip(SDS, forces.std(axis=0, ddof=1), strict=True))
-        for name in log.conditions:
-            power = 2 if name == "vibration" else 1
-            known = log.samples[name].iloc[hold].dropna().to_numpy() ** power
-            row[name] = known.mean() ** (1 / power) if len(known) else np.nan
-        rows.append(row)
-    return pd.DataFrame(rows, index=[*holds])
-
-
 def _holds_of(
+    log: Log,
     windows: Windows,
-    threshold: Threshold,
     holds: Mapping[int, slice],
-    warnings: Sequence[str],
-    settings: ImportSettings,
     left_out: Mapping[int, str],
+    settings: ImportSettings,
+    warnings: Sequence[str],
     size: int | None = None,
 ) -> Holds:
     """Holds, of which a person leaves out some, too, if the sensor was still in the others.
@@ -348,7 +470,7 @@ def _holds_of(
     InputError
         If there is no such hold, a person leaves all of them out, or the sensor was never still.
     """
-    log, left_out = windows.log, {**left_out, **settings.left_out}
+    left_out = {**left_out, **settings.left_out}
     for number in sorted(left_out.keys() - holds.keys()):
         there = short_list([str(each) for each in holds])
         raise InputError(f"exclude: there is no hold {number}; they are {there}")
@@ -356,48 +478,58 @@ def _holds_of(
     if not used:
         why = f"exclude: no {'hold' if size is None else 'block'} is left"
         raise InputError(f"{log.path}: {why} ({next(iter(left_out.values()))})")
+    rows = []
+    for number, hold in holds.items():
+        forces, time = log.forces[hold], log.time[hold]
+        row = {"start": hold.start, "end": hold.stop, "t0": time[0], "t1": time[-1]}
+        row |= {"n": len(forces), **dict(zip(AXES, forces.mean(axis=0), strict=True))}
+        row |= dict(zip(SDS, forces.std(axis=0, ddof=1), strict=True))
+        for name in log.conditions:
+            power = 2 if name == "vibration" else 1
+            known = log.samples[name].iloc[hold].dropna().to_numpy() ** power
+            row[name] = known.mean() ** (1 / power) if len(known) else np.nan
+        rows.append({**row, "left_out": left_out.get(number, "")})
+    table = pd.DataFrame(rows, index=[*holds])
     noise = hold_noise(used, log.step, windows.steps)
-    table = hold_table(log, holds)
-    found = Holds(windows, threshold, table, left_out, noise, tuple(warnings), size)
-    if _moves(found):
+    found = Holds(log, windows, table, noise, tuple(warnings), size)
+    if _moves(found, used):
         why = (
-            f"what looks like rest varies by {threshold.floor:.3g} m/s², slowly like a hand, not "
+            f"what looks like rest varies by {windows.floor:.3g} m/s², slowly like a hand, not "
             "like the noise of a sensor"
         )
-        raise _never_still(windows, why, settings, size)
+        raise _never_still(log, windows, why, size)
     return found
 
 
-def _moves(holds: Holds) -> bool:
+def _moves(holds: Holds, records: Sequence[Array]) -> bool:
     """Whether the windows "at rest" show motion: large compared with gravity, and slow.
 
     The noise of a sensor at rest is below a few hundredths of gravity. The vibration of a machine
     may be larger, but it is quick and averages out like white noise. A human body moves slowly.
     """
-    if not holds.threshold.floor > MAX_REST_NOISE * min(holds.radius, STANDARD_GRAVITY):
+    if not holds.windows.floor > MAX_REST_NOISE * min(holds.radius, STANDARD_GRAVITY):
         return False
-    curve, sd = holds.noise.allan, float(np.sqrt(np.mean(holds.noise.sd**2)))
+    sd = float(np.sqrt(np.mean(holds.noise.sd**2)))
     if sd == 0:  # all samples of a coarse sensor are rounded alike
         return False
+    curve = pooled_deviation(records, holds.log.step)
     reliable = (curve.differences >= MIN_DIFFERENCES) & (curve.tau >= QUICK_RATIO)
-    if not reliable.any():
-        return True
     white = sd * np.sqrt(holds.log.step / curve.tau[reliable])
-    return bool(np.max(curve.pooled[reliable] / white) > SLOW_RATIO)
+    return bool(
+        np.max(curve.pooled[reliable] / white, initial=np.inf if not len(white) else 0.0)
+        > SLOW_RATIO
+    )
 
 
-def _never_still(
-    windows: Windows, why: str, settings: ImportSettings, size: int | None = None
-) -> InputError:
+def _never_still(log: Log, windows: Windows, why: str, size: int | None = None) -> InputError:
     if size is not None:
         return InputError(
-            f"{windows.log.path}: blocks of {size} samples are no positions: {why}; is the number "
-            "of samples (`block`) right, or does a file hold a move?"
+            f"{log.path}: blocks of {size} samples are no positions: {why}; is the number of "
+            "samples (`block`) right, or does a file hold a move?"
         )
     least = np.sqrt(np.nanquantile(windows.variance, 0.01))
-    seconds = settings.window_s or usual_window(windows.log)
     return InputError(
-        f"{windows.log.path}: the sensor was never still: {why}; the quietest hundredth of its "
-        f"windows of {seconds:g} s varies by {least:.3g} m/s². Lay it down for some seconds in "
-        "each of ten or more attitudes, on a table or in a fixture"
+        f"{log.path}: the sensor was never still: {why}; the quietest hundredth of its windows of "
+        f"{windows.width * log.step:.2g} s varies by {least:.3g} m/s². Lay it down for some "
+        "seconds in each of ten or more attitudes, on a table or in a fixture"
     )

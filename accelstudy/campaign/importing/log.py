@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from os import PathLike
@@ -16,12 +16,18 @@ from numpy.typing import NDArray
 
 from accelstudy.basics.arguments import path_of
 from accelstudy.basics.errors import InputError
-from accelstudy.basics.units import UNITS
-from accelstudy.basics.wording import one_line
+from accelstudy.basics.units import CLOCK_UNITS, UNITS
+from accelstudy.basics.wording import plural
 from accelstudy.campaign.header import LogLayout
-from accelstudy.campaign.importing.columns import AXES, ORDINARY, resolve_layout
-from accelstudy.campaign.importing.formats import open_source
-from accelstudy.campaign.importing.sources import Source
+from accelstudy.campaign.importing.columns import (
+    AXES,
+    CONDITIONS,
+    MEANS,
+    resolve_layout,
+    which_column,
+)
+from accelstudy.campaign.importing.formats import read_table, table_in_memory
+from accelstudy.campaign.importing.raw_table import RawTable
 from accelstudy.sensors.conversion import MAX_VALUE
 
 Array = NDArray[np.float64]
@@ -30,6 +36,14 @@ MAX_FORCE = 1e4
 """m/s², some 1000 g: what levels gives no larger reading."""
 SAMPLED_ROWS = 1000
 """Rows of a log that tell how large its readings are."""
+MAX_BAD_SHARE = 0.05
+"""Share of rows without a usable reading from which on no holds are looked for in a log."""
+MAX_NAMED = 3
+"""Rows that are named of those left out."""
+GAP_RATIO = 5.0
+"""A step of time that is this many times the usual one is a gap."""
+_USUAL_RATE = 100.0
+"""1/s; of several units of time the likely one gives the rate nearest to it."""
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -38,127 +52,61 @@ class Log:
 
     Attributes
     ----------
-    source : Source, the raw table
+    raw : RawTable
     given : mapping, keys of `LogLayout` that were said of it
-    table : DataFrame, the table in memory, as it was given; None of a file
-    like : LogLayout, how another log of the sensor was read; see `resolve_layout`
-    wanted : sequence of str, what to look for beside the forces
-    untimed : bool, whether it may have neither a time nor a rate
+    layout : LogLayout, how its numbers are read; what was not said is told from the format and the
+        names
+    places : mapping, places of the columns of "fx", "fy", "fz" and what else is known
+    samples : DataFrame, all rows in SI; what is no number, or absurd, is NaN. The columns are time,
+        s since the first row that has one, by the rate, or the number of the row where nothing
+        tells it; fx, fy, fz, m/s², in forward, right, down; and the conditions, such as
+        temperature, °C
+    start : float, s, first time in the file; NaN without a column of time
+    parts : tuple of Log, of which this one is joined; see `join`
     """
 
-    source: Source
+    raw: RawTable
     given: Mapping[str, Any]
-    table: pd.DataFrame | None = None
-    like: LogLayout | None = None
-    wanted: Sequence[str] = ORDINARY
-    untimed: bool = False
+    layout: LogLayout
+    places: Mapping[str, int]
+    samples: pd.DataFrame
+    start: float
+    parts: tuple[Log, ...] = ()
 
     @property
     def path(self) -> Path:
         """Name of the log in messages."""
-        return self.source.path
-
-    @property
-    def name(self) -> str:
-        """Name of the file; DataFrame, of a table in memory."""
-        return self.path.name
+        return self.raw.path
 
     def __repr__(self) -> str:
-        return f"Log({', '.join([repr(self.name), *self.given])})"
+        return f"Log({', '.join([repr(self.path.name), *self.given])})"
 
     def _repr_html_(self) -> str:
         from accelstudy.pages.notebook import notebook_html
 
         given = pd.DataFrame(self.given.items(), columns=["setting", "value"], dtype=object)
-        return notebook_html("Log", self.name, given)
-
-    @cached_property
-    def _resolved(self) -> tuple[LogLayout, dict[str, int]]:
-        return resolve_layout(self.source, self.given, self.like, self.wanted, self.untimed)
-
-    @property
-    def layout(self) -> LogLayout:
-        """How its numbers are read; what was not said is told from the format and the names."""
-        return self._resolved[0]
-
-    @property
-    def places(self) -> Mapping[str, int]:
-        """Places of the columns of "fx", "fy", "fz" and what else is known, by these keys."""
-        return self._resolved[1]
+        return notebook_html("Log", self.path.name, given)
 
     @property
     def timed(self) -> bool:
         """Whether a column or a rate tells the times of the samples."""
-        return "time" in self.places or self.layout.rate_hz is not None
-
-    @property
-    def dated(self) -> bool:
-        """Whether its times are dates or times of day."""
-        return self.places.get("time") in self.source.dates
-
-    @property
-    def time_factor(self) -> float:
-        """S per unit of the column of time."""
-        unit = "s" if "nanoseconds" in self.places else self.layout.time_unit
-        return UNITS["s"]["ns" if self.dated else unit]
+        return "time" in self.places or self.layout.rate is not None
 
     @property
     def conditions(self) -> tuple[str, ...]:
         """What the log has besides forces and time."""
-        return tuple(key for key in self.places if key not in (*AXES, "time", "nanoseconds"))
-
-    @property
-    def samples(self) -> pd.DataFrame:
-        """All rows in SI; what is no number, or absurd, is NaN.
-
-        The columns are time, s since the first row that has one, by the rate, or the number of the
-        row where nothing tells it; fx, fy, fz, m/s², in forward, right, down; and the conditions,
-        such as temperature, °C.
-        """
-        return self._numbers[0]
+        return tuple(key for key in self.places if key in CONDITIONS)
 
     @property
     def forces(self) -> Array:
         """Forces of the samples, (n, 3), m/s²; each axis in one piece."""
         return forces_of(self.samples)
 
-    @property
-    def start(self) -> float:
-        """First time in the file, s; NaN without a column of time."""
-        return self._numbers[1]
+    def column(self, key: str) -> Array:
+        """Numbers of the column of a key as they are in the file, (n,); NaN where there is none."""
+        return _usable(self.raw.numbers(self.places[key]))
 
-    @cached_property
-    def _numbers(self) -> tuple[pd.DataFrame, float]:
-        def raw(key: str) -> NDArray[Any]:
-            return self.source.numbers(self.places[key])
-
-        start, columns, count = np.nan, ["time", *AXES, *self.conditions], len(self.source.table)
-        values = np.empty((len(columns), count))
-        if "time" in self.places:
-            time, start = _counted_from_first(raw("time"))
-            time = _usable(time) * self.time_factor
-            if "nanoseconds" in self.places:
-                time += 1e-9 * _usable(raw("nanoseconds"))
-            first = next(iter(time[np.isfinite(time)]), 0.0)
-            start = start * self.time_factor + first
-            np.subtract(time, first, out=values[0])
-        else:
-            np.divide(np.arange(count), self.layout.rate_hz or 1.0, out=values[0])
-        frame, conversion, forces = self.layout.axes, self.layout.conversion, values[1:4]
-        for force, sign, i in zip(forces, frame.signs, frame.order, strict=True):
-            own = conversion.axis(i)
-            np.subtract(raw(AXES[i]), own.offset, out=force)
-            force *= sign * own.scale
-        # The unit may be wrong, which the means of the holds show, but it is the same in all rows.
-        usual = _usable(np.abs(forces[:, :SAMPLED_ROWS]).max(axis=0))
-        usual = usual[np.isfinite(usual)]
-        limit = max([MAX_FORCE, *([1000 * np.median(usual)] if len(usual) else [])])
-        for force in forces:
-            _usable(force, limit)
-        for column, key in zip(values[4:], self.conditions, strict=True):
-            column[:] = _usable(raw(key))
-        pa.default_memory_pool().release_unused()
-        return pd.DataFrame(values.T, columns=columns, copy=False), start
+    # --- rows that lack a reading ----------------------------------------------------------------
 
     @cached_property
     def lost(self) -> NDArray[np.bool_]:
@@ -170,64 +118,244 @@ class Log:
         of_frame = dict(zip(self.layout.axes.order, AXES, strict=True))
         named = {key: of_frame[i] for i, key in enumerate(AXES)}
         lost = {key for key, value in self.samples.iloc[row].items() if np.isnan(value)}
+        lost |= {key for key in self.places if key in MEANS and np.isnan(self.column(key)[row])}
         return [key for key in self.places if named.get(key, key) in lost]
 
     def describe(self, row: int, key: str | None = None) -> str:
         """Say what stands in a row for "time", "fx", …, by default for the first that it lacks."""
         key = key or self.lacking(row)[0]
-        where, cell = self.source.look_up(row, self.places[key])
-        return f"{where}, column {self.source.names[self.places[key]]} ({key}): {cell}"
+        where, cell = self.raw.look_up(row, self.places[key])
+        return f"{where}, column {self.raw.names[self.places[key]]} ({key}): {cell}"
+
+    def warnings(self) -> list[str]:
+        """What could not be read."""
+        if self.parts:
+            return [line for part in self.parts for line in part.warnings()]
+        said = [*self.raw.warnings]
+        if self.lost.any():
+            rows = np.flatnonzero(self.lost)
+            each = "; ".join(self.describe(row) for row in rows[:MAX_NAMED].tolist())
+            more = "; …" if len(rows) > MAX_NAMED else ""
+            said.append(
+                f"{len(rows)} of {plural(len(self.lost), 'row')} left out, as a reading is missing "
+                f"or absurd: {each}{more}"
+            )
+        return said
+
+    # --- what holds are looked for in ------------------------------------------------------------
+
+    def check_timed(self) -> None:
+        """Raise `InputError` unless something tells the times of the samples."""
+        if not self.timed:
+            raise InputError(
+                f"{which_column(self.raw, 'time')}; give the column of time (`time`), or the rate "
+                "(`rate`), or, for a log without the moves between positions, the samples of each "
+                "(`block`)"
+            )
+
+    @cached_property
+    def whole_samples(self) -> pd.DataFrame:
+        """Samples that lack nothing, by their rows.
+
+        Raises
+        ------
+        InputError
+            If time does not increase, they are few, or many rows lack a reading.
+        """
+        lost, place = self.lost, self.places.get("time")
+        samples = self.samples[~lost] if lost.any() else self.samples
+        if place is not None and (backward := np.diff(samples["time"]) <= 0).any():
+            row = int(samples.index[1 + int(np.argmax(backward))])
+            where, cell = self.raw.look_up(row, place)
+            raise InputError(
+                f"{self.path}: {where}, column {self.raw.names[place]} (time): time does not "
+                f"increase ({cell}); the rate (`rate`) does without it"
+            )
+        if lost.sum() > MAX_BAD_SHARE * len(lost):
+            row = int(np.argmax(lost))
+            hint = "; give the rate (`rate`) instead" if self.lacking(row)[0] == "time" else ""
+            raise InputError(
+                f"{self.path}: {self.describe(row)}, not a usable number{hint}; {lost.sum()} of "
+                f"{plural(len(lost), 'row')} lack one, which are too many"
+            )
+        if len(samples) < 2:
+            raise InputError(f"{self.path}: too few samples ({len(samples)})")
+        return samples
+
+    @cached_property
+    def step(self) -> float:
+        """Usual time between two samples, s: the mean, without gaps.
+
+        Steps may jitter or be multiples of a clock's tick. So the median may be far from the mean,
+        and only the mean fits the number of samples.
+        """
+        if self.parts:
+            return float(np.mean([part.step for part in self.parts]))
+        if "time" not in self.places:
+            return 1.0 / (self.layout.rate or 1.0)
+        steps = kept = np.diff(self.whole_samples["time"])
+        while True:
+            mean = float(np.mean(kept))
+            without = steps[steps <= GAP_RATIO * mean]
+            if len(without) == len(kept):
+                return mean
+            kept = without
+
+    def unit_hint(self) -> str:
+        """Hint at the unit of time that would give a usual rate; empty if the rate is usual."""
+        if "time" not in self.places:
+            return ""
+        factor = _time_factor(self.raw, self.layout, self.places)
+        step = self.step / factor
+        rates = {unit: 1 / (step * UNITS["s"][unit]) for unit in CLOCK_UNITS}
+        unit = min(rates, key=lambda unit: abs(np.log(rates[unit] / _USUAL_RATE)))
+        if UNITS["s"][unit] == factor:
+            return ""
+        return (
+            f"; if its times are in {unit}, there are {rates[unit]:.4g} samples per second: give "
+            f"`time_unit` {unit}"
+        )
+
+    # --- what is joined of parts -----------------------------------------------------------------
+
+    @property
+    def time(self) -> Array:
+        """Times of the samples, (n,), s."""
+        return self.samples["time"].to_numpy()
+
+    @property
+    def part(self) -> NDArray[np.int_]:
+        """Number of the part of each sample, from 0, (n,)."""
+        lengths = [len(part.whole_samples) for part in self.parts]
+        return np.repeat(np.arange(len(lengths)), lengths)
+
+    @property
+    def starts(self) -> Array:
+        """Time of the first sample of each part as written in its file, s; NaN without any."""
+        return np.array([p.start + p.whole_samples["time"].iloc[0] for p in self.parts])
+
+    @property
+    def has_one_clock(self) -> bool:
+        """Whether the times of the parts count from one zero, so that they follow each other."""
+        return bool(np.all(np.diff(self.starts) > 0))
 
 
-AnyLog = str | PathLike[str] | Source | pd.DataFrame | Log
-"""Where a log is: the path of a file, a table in memory, or what was opened before."""
+AnyLog = str | PathLike[str] | pd.DataFrame | Log
+"""Where a log is: the path of a file, a table in memory, or what was read before."""
 
 
-def open_log(log: AnyLog, given: Mapping[str, Any], **how: Any) -> Log:
-    """Open a log of any kind.
+def read_log(
+    log: AnyLog,
+    given: Mapping[str, Any],
+    like: LogLayout | None = None,
+    more: Collection[str] = (),
+) -> Log:
+    """Read a log of any kind.
 
     Parameters
     ----------
     log : path, table or Log
     given : mapping, keys of `LogLayout`, which go before those of a Log
-    how : other fields of `Log`
+    like : LogLayout, how another log of the sensor was read; see `resolve_layout`
+    more : columns that are looked for besides those of a log, as of a table of means
 
     Raises
     ------
     InputError
-        If it cannot be opened.
+        If it cannot be read.
     """
+    known = log.given if isinstance(log, Log) else {}
+    usual = None if like is None else like.variable
+    given, variable = {**known, **given}, given.get("variable", usual)
     if isinstance(log, pd.DataFrame):
-        return _log_in_memory(log, given, **how)
-    if isinstance(log, Log):
-        how = {**how, "given": {**log.given, **given}}
-        if (variable := how["given"].get("variable")) != log.given.get("variable"):
-            how["source"] = open_source(log.path, variable)
-        same = all(getattr(log, name) == value for name, value in how.items())
-        return log if same else replace(log, **how)  # with its samples
-    if isinstance(log, Source):
-        return Log(log, given, **how)
-    like = how.get("like")
-    variable = given.get("variable") or (like and like.variable)
-    return Log(open_source(path_of("log", log, "a path or a DataFrame"), variable), given, **how)
+        raw = table_in_memory(log)
+    elif isinstance(log, Log) and given.get("variable") == known.get("variable"):
+        raw = log.raw
+    else:
+        path = log.path if isinstance(log, Log) else log
+        raw = read_table(path_of("log", path, "a path or a DataFrame"), variable)
+    layout, places = resolve_layout(raw, given, like, more)
+    return Log(raw, given, layout, places, *_convert(raw, layout, places))
 
 
-def _log_in_memory(table: pd.DataFrame, given: Mapping[str, Any], **how: Any) -> Log:
-    """Make a log of a table; times of an index of dates or durations become its last column."""
-    table = table.copy()  # what its owner changes later is not of this log
-    rows, index, name = table, table.index, str(table.index.name or "time")
-    timed = isinstance(index, pd.DatetimeIndex | pd.TimedeltaIndex)
-    if timed and not {"rate_hz", "time"} & {*given} and name not in map(str, table.columns):
-        times = index.total_seconds() if isinstance(index, pd.TimedeltaIndex) else index
-        rows, given = rows.assign(**{name: times}), {**given, "time": name}
-    try:
-        typed = pa.Table.from_pandas(rows.rename(columns=str), preserve_index=False)
-    except (TypeError, ValueError, NotImplementedError) as error:
-        reason = one_line(error.args[-1])
-        raise InputError(
-            f"log: the DataFrame cannot be a log, which has numbers: {reason}"
-        ) from None
-    return Log(Source("DataFrame", typed), given, table, **how)
+def _convert(
+    raw: RawTable, layout: LogLayout, places: Mapping[str, int]
+) -> tuple[pd.DataFrame, float]:
+    """Convert the columns of a log to SI; also its first time."""
+    conditions = [key for key in places if key in CONDITIONS]
+    start, columns, count = np.nan, ["time", *AXES, *conditions], len(raw.content)
+    values = np.empty((len(columns), count))
+    if "time" in places:
+        read = raw.nanoseconds if places["time"] in raw.dates else raw.numbers
+        time, start = _counted_from_first(read(places["time"]))
+        factor = _time_factor(raw, layout, places)
+        time = _usable(time) * factor
+        if "nanoseconds" in places:
+            time += 1e-9 * _usable(raw.numbers(places["nanoseconds"]))
+        first = next(iter(time[np.isfinite(time)]), 0.0)
+        start = start * factor + first
+        np.subtract(time, first, out=values[0])
+    else:
+        np.divide(np.arange(count), layout.rate or 1.0, out=values[0])
+    frame, conversion, forces = layout.axes, layout.conversion, values[1:4]
+    for force, sign, i in zip(forces, frame.signs, frame.order, strict=True):
+        own = conversion.axis(i)
+        np.subtract(raw.numbers(places[AXES[i]]), own.offset, out=force)
+        force *= sign * own.scale
+    # The unit may be wrong, which the means of the holds show, but it is the same in all rows.
+    usual = _usable(np.abs(forces[:, :SAMPLED_ROWS]).max(axis=0))
+    usual = usual[np.isfinite(usual)]
+    limit = max([MAX_FORCE, *([1000 * np.median(usual)] if len(usual) else [])])
+    for force in forces:
+        _usable(force, limit)
+    for condition, key in zip(values[4:], conditions, strict=True):
+        condition[:] = _usable(raw.numbers(places[key]))
+    pa.default_memory_pool().release_unused()
+    return pd.DataFrame(values.T, columns=columns, copy=False), start
+
+
+def _time_factor(raw: RawTable, layout: LogLayout, places: Mapping[str, int]) -> float:
+    """S per unit of the column of time."""
+    if places["time"] in raw.dates:
+        return 1e-9
+    return UNITS["s"]["s" if "nanoseconds" in places else layout.time_unit]
+
+
+def join(logs: Sequence[Log]) -> Log:
+    """Join the logs of one sensor, often only one, in their order: all rows that lack nothing.
+
+    Times count from the first sample and, if those of the logs do not tell, each begins where the
+    last one ends.
+
+    Raises
+    ------
+    InputError
+        If the logs differ in rate or overlap, or a channel is constant; see `Log.whole_samples`.
+    """
+    first, samples = logs[0], [log.whole_samples for log in logs]
+    joined = replace(first, parts=tuple(logs))
+    end = 0.0
+    for i, log in enumerate(logs):
+        if not 0.9 < log.step / first.step < 1.1:
+            raise InputError(
+                f"{log.path}: {1 / log.step:.6g} samples per second, but {1 / first.step:.6g} in "
+                f"{first.path}"
+            )
+        start = joined.starts[i] - joined.starts[0] if i and joined.has_one_clock else end
+        if i and start < end - joined.step / 2:  # a clock rounds
+            raise InputError(f"{log.path}: begins before the recording before it ends")
+        shift = start - (samples[i]["time"].iloc[0] if "time" in log.places else 0.0)
+        if shift:
+            samples[i] = samples[i].assign(time=samples[i]["time"] + shift)
+        end = samples[i]["time"].iloc[-1] + joined.step
+    # In a single position, a channel of a coarse sensor may be constant.
+    constant = [bool((force == force[0]).all()) for force in forces_of(samples[0]).T]
+    if len(logs) == 1 and any(constant):
+        axis = AXES[min(first.layout.axes.order[np.array(constant)])]
+        name = first.raw.names[first.places[axis]]
+        raise InputError(f"{first.path}: column {name} ({axis}) is constant")
+    whole = pd.concat(samples, join="inner") if samples[1:] else samples[0]
+    return replace(joined, samples=whole)
 
 
 def forces_of(samples: pd.DataFrame) -> Array:

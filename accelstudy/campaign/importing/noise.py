@@ -54,20 +54,19 @@ _WITHIN = _RATIO**2 + 1 / 12 - _LEFT
 
 @dataclass(frozen=True)
 class HoldNoise:
-    """Noise of the samples within all holds of a log together, in three channels.
+    """Noise of the samples within all holds of a log together.
 
-    The first channel is along the mean specific force of a hold, the other two are across it.
+    It is taken along the mean specific force of each hold, where nothing that moves the sensor
+    adds to it; if the means are too far from forces for that, in all three channels.
 
     Attributes
     ----------
-    allan : AllanDeviation, of the channels
-    sd : (3,) array, m/s², root mean square sd of the samples within holds in the channels
+    allan : AllanDeviation, of the channels of the sensor
+    sd : (3,) array, m/s², root mean square sd of the samples along the mean and across it
     center : (3,) array, m/s², zero point of the specific forces; zero if the holds determine none
     directed : bool, whether the means are close enough to forces for "along" to have a meaning
-    of_sensor : slice, channels with the noise of the sensor: those without what moves it, if there
-        are any
     accuracy : MeanAccuracy, of the mean over a typical hold in the channels of the sensor
-    across : float, m/s², standard deviation of such a mean across gravity
+    across : float, m/s², standard deviation of such a mean across gravity; 0 if not directed
     rounding : float, m/s², what rounding to the steps of the readings leaves in any mean
     count : int, holds
     """
@@ -76,7 +75,6 @@ class HoldNoise:
     sd: Array
     center: Array
     directed: bool
-    of_sensor: slice
     accuracy: MeanAccuracy
     across: float
     rounding: float
@@ -99,7 +97,7 @@ class HoldNoise:
 
 
 def hold_noise(records: Sequence[Array], step: float, resolution: ArrayLike = 0.0) -> HoldNoise:
-    """Sum the samples of each hold in its channels.
+    """Noise of the samples of holds.
 
     Parameters
     ----------
@@ -109,25 +107,24 @@ def hold_noise(records: Sequence[Array], step: float, resolution: ArrayLike = 0.
     """
     means = np.array([record.mean(axis=0) for record in records])
     center, directed = _center(means)
-    frames = [_frame(mean - center) for mean in means]
-    covariances = [np.cov(record, rowvar=False) for record in records]
-    variances = [
-        np.diag(frame.T @ covariance @ frame)
-        for covariance, frame in zip(covariances, frames, strict=True)
-    ]
-    sd = np.sqrt(np.mean(variances, axis=0))
-    allan = pooled_deviation([record[:LONGEST_RECORD] for record in records], step, frames)
+    frames = np.array([_frame(mean - center) for mean in means])
+    covariances = np.array([np.cov(record, rowvar=False) for record in records])
+    squares = np.einsum("nij,nik,nkj->j", frames, covariances, frames) / len(records)
+    sd = np.sqrt(np.maximum(squares, 0.0))
     typical = int(np.median([len(record) for record in records]))
-    of_sensor = slice(0, 1 if directed else 3)
-    accuracy, across = (
-        accuracy_of_mean(allan.channels(channels), typical * step, sd[channels], typical)
-        for channels in (of_sensor, slice(1, 3))
-    )
-    of_axes = np.sqrt(np.mean([np.diag(covariance) for covariance in covariances], axis=0))
+    short = [record[:LONGEST_RECORD] for record in records]
+
+    def accuracy_in(channels: slice, least: float) -> tuple[AllanDeviation, MeanAccuracy]:
+        curve = pooled_deviation(short, step, frames[:, :, channels], least)
+        return curve, accuracy_of_mean(curve, typical * step, sd[channels], typical)
+
+    allan, accuracy = accuracy_in(slice(0, 1 if directed else 3), 1)
+    # Two octaves are extrapolated; all averaging times would take long.
+    least = min(accuracy.tau / step, typical) / 5
+    across = accuracy_in(slice(1, 3), least)[1].allan if directed else 0.0
+    of_axes = np.sqrt(np.einsum("nii->i", covariances) / len(records))
     rounding = float(np.sqrt(np.mean(rounding_of_mean(resolution, of_axes) ** 2)))
-    return HoldNoise(
-        allan, sd, center, directed, of_sensor, accuracy, across.allan, rounding, len(records)
-    )
+    return HoldNoise(allan, sd, center, directed, accuracy, across, rounding, len(records))
 
 
 def _center(means: Array) -> tuple[Array, bool]:

@@ -13,7 +13,6 @@ from numpy.typing import NDArray
 from accelstudy.basics.wording import plural
 from accelstudy.campaign.importing.columns import AXES
 from accelstudy.campaign.importing.holds import Holds
-from accelstudy.campaign.importing.windows import Windows
 from accelstudy.drawing.style import FULL, INK, new_figure
 
 Array = NDArray[np.float64]
@@ -35,10 +34,10 @@ def draw_segmentation(holds: Holds, offset: Array | float = 0.0) -> Figure:
 
     Holds are shaded and numbered, those that are left out hatched.
     """
-    edges, low, high = _envelope(holds.windows)
+    edges, low, high = _envelope(holds)
     low[:, :3] -= offset
     high[:, :3] -= offset
-    used = holds.are_used
+    used, threshold = holds.used, holds.windows.threshold
     ends = holds.table[["t0", "t1"]].to_numpy()
     middle = (edges[:-1] + edges[1:]) / 2
     figure = new_figure(FULL, 90)
@@ -47,12 +46,12 @@ def draw_segmentation(holds: Holds, offset: Array | float = 0.0) -> Figure:
         _band(above, middle, low[:, i], high[:, i], colour, name)
     _band(below, middle, low[:, 3], high[:, 3], INK, None)
     if holds.size is None:
-        label = f"threshold {holds.threshold.sd:.2g} m/s²"
-        below.axhline(holds.threshold.sd, color=_THRESHOLD, linestyle="--", label=label)
+        label = f"threshold {threshold:.2g} m/s²"
+        below.axhline(threshold, color=_THRESHOLD, linestyle="--", label=label)
     kind = "static hold" if holds.size is None else "block"
     kept, lost = plural(int(used.sum()), kind), f"{len(holds.left_out)} left out"
     looks = [(used, kept, {"color": _SHADE}), (~used, lost, _LEFT_OUT)]
-    for shaded, label, look in looks[: 2 if holds.left_out else 1]:
+    for shaded, label, look in looks[: 1 if used.all() else 2]:
         for ax, shown in ((above, label), (below, None)):
             whole = ax.get_xaxis_transform()
             common = {"transform": whole, "linewidth": 0, "zorder": 0.5, "label": shown}
@@ -70,7 +69,7 @@ def draw_segmentation(holds: Holds, offset: Array | float = 0.0) -> Figure:
     return figure
 
 
-def _envelope(windows: Windows) -> tuple[Array, Array, Array]:
+def _envelope(holds: Holds) -> tuple[Array, Array, Array]:
     """Least and largest values of a log and its windows in spans of time.
 
     Returns
@@ -79,13 +78,13 @@ def _envelope(windows: Windows) -> tuple[Array, Array, Array]:
     low, high : (k, 4) arrays, of fx, fy, fz and of the standard deviation of the windows, m/s²;
         NaN in a gap
     """
-    time = windows.log.time
+    time = holds.log.time
     count = max(1, min(_SPANS, len(time) // 4))
     edges = np.linspace(time[0], time[-1], count + 1)
     firsts = np.searchsorted(time, edges[:-1])
     filled = np.diff(firsts, append=len(time)) > 0
     low, high = np.full((2, count, 4), np.nan)
-    for i, values in enumerate([*windows.log.forces.T, windows.variance]):
+    for i, values in enumerate([*holds.log.forces.T, holds.windows.variance]):
         for ends, end_of in ((low, np.fmin), (high, np.fmax)):
             ends[filled, i] = end_of.reduceat(values, firsts[filled])
     for ends in (low, high):
@@ -96,8 +95,8 @@ def _envelope(windows: Windows) -> tuple[Array, Array, Array]:
 def _number(ax: Axes, holds: Holds) -> None:
     """Write the numbers of the holds above them."""
     every = 1 + len(holds.table) * len(str(holds.table.index[-1])) // _DIGITS
-    for i, (number, t0, t1) in enumerate(holds.table[["t0", "t1"]].itertuples()):
-        used = number not in holds.left_out
+    for i, (number, t0, t1, why) in enumerate(holds.table[["t0", "t1", "left_out"]].itertuples()):
+        used = not why
         if i % every == 0 or not used:
             ax.annotate(
                 f"{number}",

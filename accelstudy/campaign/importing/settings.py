@@ -1,4 +1,4 @@
-"""The settings of `accelstudy import`."""
+"""The settings of `accelstudy import`: the keywords of `find_holds`, as a file may have them."""
 
 from __future__ import annotations
 
@@ -6,57 +6,38 @@ import re
 from collections.abc import Mapping
 from typing import Annotated, Any, ClassVar, Literal, Self
 
-import numpy as np
-from pydantic import BeforeValidator, Field, model_validator
+from pydantic import Field, model_validator
 
-from accelstudy.basics.arguments import tidy
 from accelstudy.basics.errors import InputError, key
-from accelstudy.basics.units import MGON, STANDARD_GRAVITY
+from accelstudy.basics.units import STANDARD_GRAVITY
 from accelstudy.campaign.header import LogLayout
 from accelstudy.files.reading import overlay, read_layer
 from accelstudy.files.validation import (
-    ConfigSection,
     Gravity,
     NotNegative,
     Positive,
-    SigmaAngle,
     SigmaGravity,
     in_unit,
     validate,
 )
 
-_LARGE = Field(le=1e6)
-
 _EXCLUDED = re.compile(r"(\d{1,9}(?:\s*,\s*\d{1,9})*)\s*:\s*(\S.*)", re.DOTALL)
 """Holds by their numbers, and why they are left out."""
-
-
-class GravitySettings(ConfigSection):
-    """Gravity where the sensor was."""
-
-    value_mps2: Annotated[Gravity, in_unit("m/s^2")] = Field(
-        STANDARD_GRAVITY, description="local gravity, m/s²"
-    )
-    sigma_mps2: SigmaGravity = Field(0.0, description="its standard deviation; 0 holds it fixed")
-
-
-def _gravity_of(value: Any) -> Any:
-    """Take local gravity alone for the block, as the option does."""
-    return {"value_mps2": value} if isinstance(value, float | int | str) else value
-
-
-class RobotSettings(ConfigSection):
-    """The robot whose angles a table of means has."""
-
-    angle_sigma_mgon: SigmaAngle = Field(description="standard deviation of roll and of pitch")
-    unit: Literal["gon", "deg", "rad"] = Field("gon", description="unit of the angles in the table")
+Force = Annotated[Positive, Field(le=1e6), in_unit("m/s^2")]
 
 
 class ImportSettings(LogLayout):
-    """How a log is read, and what the campaign gets from it; the keys of a settings file."""
+    """How a log is read, and what the campaign gets from it."""
 
     retired: ClassVar = {
         **LogLayout.retired,
+        "rate_hz": "write rate instead",
+        "range_mps2": "write range instead",
+        "window_s": "write window instead",
+        "threshold_mps2": "write threshold instead",
+        "trim_s": "write trim instead",
+        "shortest_s": "write shortest instead",
+        "robot": "write robot_sigma, as 3.2mgon, and robot_unit instead",
         "join": "holds in one attitude are positions each",
         "sensors": "import each of them by its `columns`, with a `name` of its own",
     }
@@ -67,30 +48,39 @@ class ImportSettings(LogLayout):
     )
     name: str | None = Field(None, description="name of the campaign; that of the file if absent")
     sensor: str | None = Field(None, description="what was calibrated")
-    gravity: Annotated[GravitySettings, BeforeValidator(_gravity_of)] = GravitySettings()
-    robot: RobotSettings | None = Field(None, description="with means: the robot's angles")
-    range_mps2: Annotated[Annotated[Positive, _LARGE] | None, in_unit("m/s^2")] = Field(
-        None, alias="range", description="the sensor measures ± this"
+    gravity: Annotated[Gravity, in_unit("m/s^2")] = Field(
+        STANDARD_GRAVITY, description="local gravity, m/s²"
     )
-    window_s: Annotated[Positive | None, in_unit("s")] = Field(
-        None,
-        alias="window",
-        description="length of the sliding window; 1 s, or 9 samples if these last longer",
+    gravity_sigma: Annotated[SigmaGravity, in_unit("m/s^2")] = Field(
+        0.0, description="its standard deviation; 0 holds it fixed"
     )
-    threshold_mps2: Annotated[Annotated[Positive, _LARGE] | None, in_unit("m/s^2")] = Field(
-        None,
-        alias="threshold",
-        description="sd of a window at rest; chosen from the data if absent",
+    robot_sigma: Annotated[NotNegative, Field(lt=6.3), in_unit("rad")] | None = Field(
+        None, description="with means: standard deviation of the robot's roll and pitch, rad"
     )
-    trim_s: Annotated[NotNegative, in_unit("s")] = Field(
-        0.2, alias="trim", description="cut from both ends of a hold"
+    robot_unit: Literal["gon", "deg", "rad"] = Field("gon", description="unit of these angles")
+    range: Force | None = Field(None, description="the sensor measures ± this")
+    window: Annotated[Positive, in_unit("s")] | None = Field(
+        None, description="length of the sliding window; 1 s, or 9 samples if these last longer"
     )
-    shortest_s: Annotated[Positive, in_unit("s")] = Field(
-        1.0, alias="shortest", description="shortest hold"
+    threshold: Force | None = Field(
+        None, description="sd of a window at rest; chosen from the data if absent"
     )
+    trim: Annotated[NotNegative, in_unit("s")] = Field(
+        0.2, description="cut from both ends of a hold"
+    )
+    shortest: Annotated[Positive, in_unit("s")] = Field(1.0, description="shortest hold")
     exclude: list[str] = Field(
         [], description="holds to leave out, and why, as 13:moved or 13,14:somebody passed"
     )
+
+    @model_validator(mode="before")
+    @classmethod
+    def _no_section(cls, content: Any) -> Any:
+        if isinstance(content, Mapping) and isinstance(content.get("gravity"), Mapping):
+            raise ValueError(
+                "gravity: no longer a section; write its value, as 9.81, and gravity_sigma"
+            )
+        return content
 
     @model_validator(mode="after")
     def _names_holds(self) -> Self:
@@ -98,22 +88,10 @@ class ImportSettings(LogLayout):
         return self
 
     @property
-    def layout(self) -> dict[str, Any]:
+    def said(self) -> dict[str, Any]:
         """Keys of the layout of the log that were said."""
         fields = {*LogLayout.model_fields}
         return self.model_dump(include=fields, exclude_unset=True, exclude_none=True)
-
-    def with_layout(self, layout: LogLayout) -> Self:
-        """Return the settings with the layout that a log has."""
-        fields = LogLayout.model_fields
-        return self.model_copy(update={key: getattr(layout, key) for key in fields})
-
-    @property
-    def full_range(self) -> float:
-        """Range of the sensor, m/s²; infinite if it is unknown, or the offset of counts is."""
-        if self.range_mps2 is None or (self.unit == "counts" and self.offset is None):
-            return np.inf
-        return self.range_mps2
 
     @property
     def left_out(self) -> dict[int, str]:
@@ -129,14 +107,6 @@ class ImportSettings(LogLayout):
         return reasons
 
 
-KEYS = {
-    "gravity": "gravity.value_mps2",
-    "robot_sigma": "robot.angle_sigma_mgon",
-    "robot_unit": "robot.unit",
-}
-"""Keywords whose keys in a file have other names, of which some say a unit."""
-
-
 def settings_of(
     given: Mapping[str, Any], layout: Mapping[str, Any] | None = None
 ) -> ImportSettings:
@@ -147,33 +117,22 @@ def settings_of(
     InputError
         One line that names the keyword, or the file and the key.
     """
-    path = given["settings"]
-    content, names = _keys_of(given, ImportSettings)
-    own = LogLayout.model_validate(layout or {}).model_dump(by_alias=True, exclude_unset=True)
-    below = overlay({} if path is None else read_layer(path), own)
-    return validate(ImportSettings, overlay(below, content), path or "settings", names=names)
+    path, own = given["settings"], _said(given, ImportSettings)
+    content = overlay({} if path is None else read_layer(path), {**(layout or {}), **own})
+    return validate(ImportSettings, content, path or "settings", names={k: key(k) for k in own})
 
 
 def layout_of(given: Mapping[str, Any]) -> dict[str, Any]:
     """Keys of a layout that keywords say, checked; other keywords do not count."""
-    content, names = _keys_of(given, LogLayout)
-    return validate(LogLayout, content, "log", names=names).model_dump(exclude_unset=True)
+    own = _said(given, LogLayout)
+    names = {name: key(name) for name in own}
+    return validate(LogLayout, own, "log", names=names).model_dump(exclude_unset=True)
 
 
-def _keys_of(
-    given: Mapping[str, Any], model: type[LogLayout]
-) -> tuple[dict[str, Any], dict[str, str]]:
-    """Content of a file that says the same as those keywords that a model has; keys with names."""
-    known = {field.alias or name for name, field in model.model_fields.items()}
-    content: dict[str, Any] = {}
-    names = {}
-    for name, value in given.items():
-        place = KEYS.get(name, name)
-        if place.partition(".")[0] not in known or value is None or value is False or value == ():
-            continue
-        names[place] = key(name)
-        block, _, inner = place.rpartition(".")
-        part = content.setdefault(block, {}) if block else content
-        value = tidy(value / MGON) if name == "robot_sigma" else value
-        part[inner] = list(value) if isinstance(value, tuple) else value
-    return content, names
+def _said(given: Mapping[str, Any], model: type[LogLayout]) -> dict[str, Any]:
+    """Keywords that say something and are keys of a model."""
+    return {
+        name: list(value) if isinstance(value, tuple) else value
+        for name, value in given.items()
+        if name in model.model_fields and not (value is None or value is False or value == ())
+    }

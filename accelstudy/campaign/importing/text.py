@@ -9,8 +9,8 @@ import zlib
 from collections import Counter
 from collections.abc import Callable, Iterable, Sequence
 from contextlib import suppress
-from functools import partial
-from io import BytesIO
+from dataclasses import dataclass, field
+from io import BytesIO, StringIO
 from itertools import islice, product, takewhile
 from pathlib import Path
 
@@ -20,18 +20,19 @@ from pyarrow import csv as arrow_csv
 
 from accelstudy.basics.errors import InputError, printable
 from accelstudy.basics.progress import stage
-from accelstudy.basics.wording import one_line, plural
+from accelstudy.basics.wording import plural
 from accelstudy.campaign.importing.columns import unit_of_cell
-from accelstudy.campaign.importing.sources import Source
+from accelstudy.campaign.importing.raw_table import RawTable
 from accelstudy.files.reading import readable
 
 GZIP = b"\x1f\x8b"
 """First bytes of a gzipped file."""
 
 _PREVIEW = 65536  # characters of a text from which the layout of its rows is told
-_BLOCK = 2**20  # bytes that hold any line
+_BLOCK = 2**22  # bytes that hold any line
 _COMMENTS = ("#", "%", "//", ";")
-_NO_READING = frozenset({"", "-", "--", "nan", "na", "n/a", "null", "none"})
+_NO_READING = ("", "-", "--", "nan", "na", "n/a", "null", "none")
+_NULLS = [each for cell in _NO_READING for each in {cell, cell.upper(), cell.title(), "NaN", "N/a"}]
 _LAYOUTS = ((",", "."), *product((";", "\t", "|", None), ".,"))
 """Delimiters, None for blanks, with decimal marks."""
 _LABEL = re.compile(rb"(?<![\w.])([A-Za-z_]\w*)[ \t]*[:=][ \t]*(?=[-+.\d])")
@@ -39,48 +40,47 @@ _LABEL = re.compile(rb"(?<![\w.])([A-Za-z_]\w*)[ \t]*[:=][ \t]*(?=[-+.\d])")
 _DECIMAL_COMMA = r"^([+-]?[0-9]*),([0-9]+([eE][+-]?[0-9]+)?)$"
 
 
-def read_text(path: Path) -> Source:
-    """Read a text; its cells stay as they are written, without blanks around them.
+@dataclass(frozen=True, eq=False)
+class TextTable(RawTable):
+    """The raw table of a text; its numbers are read at once, its cells as text once more."""
 
-    Raises
-    ------
-    InputError
-        If it is no table.
-    """
-    content, labels = _read(path)
-    rows = _Rows.told_from(content, path)
-    names = labels if len(labels) == rows.width else rows.names
-    # Rows as they stand, then all of the usual width, then each one by itself.
-    for is_regular in (None, rows.are_regular, lambda _: False):
-        try:
-            columns = rows.parse(content, is_regular, path)
-            break
-        except pa.ArrowInvalid as error:
-            failed = InputError(f"{path}: no table: {one_line(error)}")
-    else:
-        raise failed
-    again = f"the header stands {plural(rows.repeated, 'more time')} between the rows"
-    return Source(
-        path,
-        pa.table(columns, names=names or [str(i) for i in range(rows.width)]),
-        notes=[*rows.notes, *([again] if rows.repeated else [])],
-        named=names is not None,
-        locate=partial(_look_up, path, rows),
-    )
+    rows: _Rows = field(kw_only=True)
 
+    @classmethod
+    def read(cls, path: Path) -> TextTable:
+        """Read a text.
 
-def _look_up(path: Path, rows: _Rows, row: int, place: int) -> tuple[str, str]:
-    """Find a cell; this reads the file again, which only errors and warnings need."""
-    lines = enumerate(_read(path)[0].decode().split("\n"), 1)
-    below = ((n, rows.cells(line)) for n, line in lines if n > rows.first)
-    number, cells = next(islice(((n, c) for n, c in below if c is not None), row, None), (0, []))
-    if not number:
-        return f"row {row + 1}", "unreadable"
-    if any(cells[rows.width :]):
-        return f"line {number}", f"{len(cells)} columns instead of {rows.width}"
-    if place >= len(cells):
-        return f"line {number}", "the line ends before it"
-    return f"line {number}", repr(cells[place][:40]) if cells[place] else "nothing"
+        Raises
+        ------
+        InputError
+            If it is no table.
+        """
+        text, labels = _read(path)
+        rows = _Rows.told_from(text, path)
+        names = labels if len(labels) == rows.width else rows.names
+        content = rows.parse(text, path, names or [str(i) for i in range(rows.width)])
+        again = f"the header stands {plural(rows.repeated, 'more time')} between the rows"
+        notes = [*rows.notes, *([again] if rows.repeated else [])]
+        return cls(path, content, notes=notes, named=names is not None, rows=rows)
+
+    def cells(self) -> pa.Table:
+        """Return the columns of cells as they are written, without blanks around them."""
+        text, _ = _read(self.path)
+        return self.rows.parse(text, self.path, self.content.column_names, as_written=True)
+
+    def look_up(self, row: int, place: int) -> tuple[str, str]:
+        """Find a cell; this reads the file again, which only errors and warnings need."""
+        lines = enumerate(_read(self.path)[0].decode().split("\n"), 1)
+        below = ((n, self.rows.cells(line)) for n, line in lines if n > self.rows.first)
+        of_rows = ((n, cells) for n, cells in below if cells is not None)
+        number, cells = next(islice(of_rows, row, None), (0, []))
+        if not number:
+            return f"row {row + 1}", "unreadable"
+        if any(cells[self.rows.width :]):
+            return f"line {number}", f"{len(cells)} columns instead of {self.rows.width}"
+        if place >= len(cells):
+            return f"line {number}", "the line ends before it"
+        return f"line {number}", repr(cells[place][:40]) if cells[place] else "nothing"
 
 
 class _Rows:
@@ -93,8 +93,8 @@ class _Rows:
     score : int, numbers in rows of the usual width, of which the right marks give most; 0 if the
         lines are no table
     many : int, numbers in a usual row
-    first : int, lines before the data
     width : int, cells of a row; a row with fewer lacks the last ones
+    first : int, lines before the data
     names : list of str, from the header; None without one
     header : tuple of str, lines with names and units
     notes : list of str, how the text was taken
@@ -106,40 +106,35 @@ class _Rows:
         self._comments = tuple(mark for mark in _COMMENTS if mark != delimiter)
         # Characters around a line that are no cells; None for all blanks.
         self._around = " \r\n" if delimiter == "\t" else None
-        rows = [
-            (i, split_line(line, delimiter))
+        self.header: tuple[str, ...] = ()
+        self.repeated = 0
+        rows = {
+            i: split_line(line, delimiter)
             for i, line in enumerate(lines)
             if line.strip() and not line.lstrip().startswith(self._comments)
-        ]
-        numbers = {i: sum(_is_number(cell, decimal) for cell in cells) for i, cells in rows}
-        rows = [(i, cells) for i, cells in rows if numbers[i]]
-        usual = _most_frequent(len(cells) for _, cells in rows) if rows else 0
-        alike = [(i, cells) for i, cells in rows if len(cells) == usual]
-        self.score = sum(numbers[i] for i, _ in alike)
+        }
+        numbers = {i: sum(_is_number(cell, decimal) for cell in row) for i, row in rows.items()}
+        rows = {i: row for i, row in rows.items() if numbers[i]}
+        self.width = _most_frequent(map(len, rows.values())) if rows else 0
+        alike = {i: row for i, row in rows.items() if len(row) == self.width}
+        self.score = sum(numbers[i] for i in alike)
         if not self.score:
             return
         # A line may hold text beside its numbers; everything before the first such line is the
         # header, but for rows that lack some reading.
-        self.many = max(1, _most_frequent(numbers[i] for i, _ in alike))
-        full = next(place for place, (i, _) in enumerate(alike) if numbers[i] >= self.many)
-        before = takewhile(lambda row: self._lacks(row[1], alike[full][1]), alike[full - 1 :: -1])
-        self.first = min([alike[full][0], *(i for i, _ in before if full)])
-        self.width = usual
-        cells = [cells for i, cells in rows if i >= self.first]
-        self.header: tuple[str, ...] = ()
-        self.names: list[str] | None = None
-        self.notes: list[str] = []
-        self._read_header(lines[: self.first], cells)
-        self.repeated = 0
-        self._comment = next((c for c in "#%" for line in lines if line.lstrip()[:1] == c), "#")
-        blanks = ("  ", "\t", "\n ", " \n") if delimiter is None else ()
-        self._marks = [m.encode() for m in ('"', *self._comments, *self.header, *blanks)]
+        self.many = max(1, _most_frequent(numbers[i] for i in alike))
+        full = next(i for i in alike if numbers[i] >= self.many)
+        above = takewhile(
+            lambda i: self._lacks(alike[i], alike[full]), reversed([i for i in alike if i < full])
+        )
+        self.first = min([full, *above])
+        self._sample = [row for i, row in rows.items() if i >= self.first]
 
     @classmethod
-    def told_from(cls, content: bytes, path: Path) -> _Rows:
-        """Tell the delimiter and the decimal mark of a text."""
-        lines = content[:_PREVIEW].decode(errors="replace").split("\n")
-        if len(content) > _PREVIEW:
+    def told_from(cls, text: bytes, path: Path) -> _Rows:
+        """Tell the delimiter and the decimal mark of a text, and read its header."""
+        lines = text[:_PREVIEW].decode(errors="replace").split("\n")
+        if len(text) > _PREVIEW:
             if len(lines) == 1:
                 raise InputError(f"{path}: no end of a line in {_PREVIEW} characters; is it text?")
             lines.pop()  # it may be cut
@@ -150,81 +145,62 @@ class _Rows:
         best = max(tables, key=lambda table: table.score)
         if not best.score:
             raise InputError(f"{path}: no line of numbers at the beginning")
+        best._read_header(lines)
         return best
 
-    def parse(
-        self, content: bytes, are_regular: Callable[[bytes], bool] | None, path: Path
-    ) -> list[pa.ChunkedArray]:
-        """Cells of the columns; blocks of lines that are not regular are written anew before."""
-        self.repeated = 0
-        lines = BytesIO(content)
-        for _ in range(self.first):
-            lines.readline()
-        start = lines.tell()
-        text = pa.py_buffer(content).slice(start)
-        if are_regular is not None or not self.are_clean(content, start):
-            keep = are_regular or self.are_clean
-            blocks = iter(lambda: lines.read(_BLOCK) + lines.readline(), b"")
-            text = pa.py_buffer(b"".join(b if keep(b) else self._rewritten(b) for b in blocks))
-        types = {str(place): pa.string() for place in range(self.width)}
-        if not text.size:
-            return pa.schema(types).empty_table().columns
-        with stage(f"reading {path.name}"):
-            columns = arrow_csv.read_csv(
-                pa.BufferReader(text),
-                arrow_csv.ReadOptions(column_names=[*types], block_size=_BLOCK),
-                arrow_csv.ParseOptions(delimiter=self.delimiter or " "),
-                arrow_csv.ConvertOptions(column_types=types, strings_can_be_null=False),
-            ).columns
-        if content.find(b" ", start) >= 0:
-            columns = [*map(pc.utf8_trim_whitespace, columns)]
-        if self.decimal == ",":
-            columns = [pc.replace_substring_regex(c, _DECIMAL_COMMA, r"\1.\2") for c in columns]
-        return columns
+    # --- the header ------------------------------------------------------------------------------
 
-    def _rewritten(self, block: bytes) -> bytes:
-        """Lines of a text as rows of the usual width, without those that are no rows."""
-        lines = block.decode().split("\n")
-        self.repeated += sum(line.strip() in self.header for line in lines)
-        rows = (self.cells(line) for line in lines)
-        return "".join(self.join(cells) for cells in rows if cells is not None).encode()
+    def _read_header(self, lines: Sequence[str]) -> None:
+        """Names from the last line before the data, which may be a comment, and units below."""
+        self.names: list[str] | None = None
+        self.notes: list[str] = []
+        units: list[str] = []
+        unfit: list[str] = []
+        for number, line in reversed([*enumerate(lines[: self.first], 1)]):
+            text = line.strip(self._around).lstrip("".join(self._comments)).strip(self._around)
+            if not text.strip(f" \t-=+|_{self.delimiter or ''}"):  # a rule, or nothing
+                continue
+            cells = split_line(text, self.delimiter)
+            cells = [printable(" ".join(cell.strip("\"'").split())) for cell in cells]
+            if not units and any(cells) and all(map(unit_of_cell, filter(None, cells))):
+                units, self.header = cells, (line.strip(),)
+                continue
+            if self._take_names(cells, units):
+                self.header += (line.strip(),)
+                self.notes += [f"units: in line {number + 1}, below the names"] if units else []
+                break
+            if len(cells) > 2:
+                unfit.append(
+                    f"line {number} has {len(cells)} names for {self.width} columns, so these "
+                    "have numbers, from 0"
+                )
+            if not line.lstrip().startswith(self._comments):
+                break
+        if self.names is None:
+            self.notes += unfit[:1]
+            self._take_names(units, [])
+        # What Arrow takes for something else.
+        comment = next((c for c in "#%" for line in lines if line.lstrip()[:1] == c), "#")
+        blanks = ("  ", "\t", "\n ", " \n") if self.delimiter is None else ()
+        self._comment = comment
+        self._marks = [m.encode() for m in ('"', *self._comments, *self.header, *blanks)]
 
-    def are_clean(self, content: bytes, start: int = 0) -> bool:
-        """Whether there are, from a place on, no marks that Arrow takes for something else."""
-        # A search for one mark is much faster than for several in a row.
-        found = (
-            content.find(mark[:1], start) >= 0 and content.find(mark, start) >= 0
-            for mark in self._marks
-        )
-        return not content.startswith(b" ", start) and not any(found)
-
-    def are_regular(self, block: bytes) -> bool:
-        """Whether a block of lines is clean, and has as many cells as rows of the usual width."""
-        delimiter, lines = (self.delimiter or " ").encode(), block.count(b"\n")
-        usual = block.endswith(b"\n") and block.count(delimiter) == lines * (self.width - 1)
-        return usual and b"\n\n" not in block and self.are_clean(block)
-
-    def cells(self, line: str) -> list[str] | None:
-        """Cells of a row; None of any other line."""
-        if (
-            not (content := line.strip(self._around))
-            or content.startswith(self._comments)
-            or line.strip() in self.header
-        ):
-            return None
-        start = line.split(self._comment)[0]
-        row = line if start.count('"') % 2 else start
-        return split_line(row.strip(self._around), self.delimiter)
-
-    def join(self, cells: list[str]) -> str:
-        """Line of a row of the usual width; of one with more cells nobody knows which are right."""
-        mark = self.delimiter or " "
-        cells = [] if any(cells[self.width :]) else cells[: self.width]
-        cells = [
-            '"' + cell.replace('"', '""') + '"' if mark in cell or '"' in cell else cell
-            for cell in cells
-        ]
-        return mark.join(cells + [""] * (self.width - len(cells))) + "\n"
+    def _take_names(self, names: list[str], units: Sequence[str]) -> bool:
+        """Take names, with units behind them, if there is one for each column."""
+        longest = max(map(len, self._sample))
+        while len(names) > longest and not names[-1]:
+            names = names[:-1]
+        empty = all(row[len(names) :][:1] == [""] for row in self._sample)
+        if len(names) == self.width - 1 and empty:
+            self.notes.append("a delimiter at the end of each row is no column")
+            self.width = len(names)
+        if self.width < len(names) == longest:
+            self.width = len(names)
+        if len(names) == self.width:
+            of_names = (unit_of_cell(unit) for unit in [*units, *[""] * self.width])
+            pairs = zip(names, of_names, strict=False)
+            self.names = [f"{name} [{unit}]" if name and unit else name for name, unit in pairs]
+        return self.names is not None
 
     def _lacks(self, cells: Sequence[str], full: Sequence[str]) -> bool:
         """Whether a row is like a full one, but for some readings."""
@@ -235,51 +211,93 @@ class _Rows:
             for cell, like in zip(cells, full, strict=True)
         )
 
-    def _read_header(self, before: Sequence[str], rows: Sequence[Sequence[str]]) -> None:
-        """Names from the last line before the data, which may be a comment, and units below."""
-        units: list[str] = []
-        unfit: list[str] = []
-        for number, line in reversed([*enumerate(before, 1)]):
-            text = line.strip(self._around).lstrip("".join(self._comments)).strip(self._around)
-            if not text.strip(f" \t-=+|_{self.delimiter or ''}"):  # a rule, or nothing
-                continue
-            cells = split_line(text, self.delimiter)
-            cells = [printable(" ".join(cell.strip("\"'").split())) for cell in cells]
-            if not units and any(cells) and all(unit_of_cell(c) is not None for c in cells if c):
-                units, self.header = cells, (line.strip(),)
-                continue
-            self._take_names(cells, rows)
-            if self.names is not None:
-                self.header += (line.strip(),)
-                if units:
-                    named = zip(self.names, units + [""] * self.width, strict=False)
-                    both = ((name, name and unit_of_cell(cell)) for name, cell in named)
-                    self.names = [f"{name} [{unit}]" if unit else name for name, unit in both]
-                    self.notes.append(f"units: in line {number + 1}, below the names")
-                return
-            if len(cells) > 2:
-                unfit.append(
-                    f"line {number} has {len(cells)} names for {self.width} columns, so these "
-                    "have numbers, from 0"
-                )
-            if not line.lstrip().startswith(self._comments):
-                break
-        self.notes += unfit[:1]
-        if units:
-            self._take_names(units, rows)
+    # --- the body --------------------------------------------------------------------------------
 
-    def _take_names(self, names: list[str], rows: Sequence[Sequence[str]]) -> None:
-        """Take names if there is one for each column."""
-        longest = max(map(len, rows))
-        while len(names) > longest and not names[-1]:
-            names = names[:-1]
-        if len(names) == self.width - 1 and not any(row[len(names) :][:1] != [""] for row in rows):
-            self.width = len(names)
-            self.notes.append("a delimiter at the end of each row is no column")
-        if self.width < len(names) == longest:
-            self.width = len(names)
-        if len(names) == self.width:
-            self.names = names
+    def parse(
+        self, text: bytes, path: Path, names: Sequence[str], as_written: bool = False
+    ) -> pa.Table:
+        """Table of the rows: a column of numbers as such, unless cells stay as they are written."""
+        firsts = [
+            next((row[i] for row in self._sample if row[i : i + 1] not in ([], [""])), "")
+            for i in range(self.width)
+        ]
+        types = {
+            str(i): pa.string()
+            for i, cell in enumerate(firsts)
+            if as_written or not _is_number(cell, self.decimal)
+        }
+        start = 0
+        for _ in range(self.first):
+            start = text.index(b"\n", start) + 1
+        # Rows as they stand, or with those written anew that are not regular, or all of them.
+        clean = [] if not self._are_clean(text, start) else [None]
+        for keep in (*clean, self._are_regular, lambda _: False):
+            body = pa.py_buffer(text).slice(start)
+            if keep is not None:
+                body = pa.py_buffer(self._regular(text[start:], keep))
+            with suppress(pa.ArrowInvalid), stage(f"reading {path.name}"):
+                content = arrow_csv.read_csv(
+                    pa.BufferReader(body),
+                    arrow_csv.ReadOptions(
+                        column_names=[*map(str, range(self.width))], block_size=_BLOCK
+                    ),
+                    arrow_csv.ParseOptions(delimiter=self.delimiter or " "),
+                    arrow_csv.ConvertOptions(
+                        column_types=types, null_values=_NULLS, decimal_point=self.decimal
+                    ),
+                )
+                break
+        else:
+            raise InputError(f"{path}: no table")
+        return pa.table([*map(self._tidied, content.columns)], names=[*names])
+
+    def _tidied(self, column: pa.ChunkedArray) -> pa.ChunkedArray:
+        """Column whose cells of text have no blanks around them, and points as decimal marks."""
+        if not pa.types.is_string(column.type):
+            return column
+        cells = pc.utf8_trim_whitespace(column)
+        if self.decimal == ",":
+            cells = pc.replace_substring_regex(cells, _DECIMAL_COMMA, r"\1.\2")
+        return cells
+
+    def _regular(self, body: bytes, keep: Callable[[bytes], bool]) -> bytes:
+        """Lines of which blocks are written anew, as rows of the usual width, or kept."""
+        self.repeated, lines = 0, BytesIO(body)
+        blocks = iter(lambda: lines.read(_BLOCK) + lines.readline(), b"")
+        return b"".join(block if keep(block) else self._rewritten(block) for block in blocks)
+
+    def _rewritten(self, block: bytes) -> bytes:
+        """Rows of the usual width; of one with more cells nobody knows which are right."""
+        lines, out = block.decode().split("\n"), StringIO()
+        self.repeated += sum(line.strip() in self.header for line in lines)
+        writer = csv.writer(out, delimiter=self.delimiter or " ", lineterminator="\n")
+        for cells in filter(None, map(self.cells, lines)):
+            usable = [] if any(cells[self.width :]) else cells[: self.width]
+            writer.writerow(usable + [""] * (self.width - len(usable)))
+        return out.getvalue().encode()
+
+    def _are_clean(self, text: bytes, start: int = 0) -> bool:
+        """Whether there are, from a place on, no marks that Arrow takes for something else."""
+        # A search for one mark is much faster than for several in a row.
+        found = (
+            text.find(mark[:1], start) >= 0 and text.find(mark, start) >= 0 for mark in self._marks
+        )
+        return not text.startswith(b" ", start) and not any(found)
+
+    def _are_regular(self, block: bytes) -> bool:
+        """Whether a block of lines is clean, and has as many cells as rows of the usual width."""
+        delimiter, lines = (self.delimiter or " ").encode(), block.count(b"\n")
+        usual = block.endswith(b"\n") and block.count(delimiter) == lines * (self.width - 1)
+        return usual and b"\n\n" not in block and self._are_clean(block)
+
+    def cells(self, line: str) -> list[str] | None:
+        """Cells of a row; None of any other line."""
+        content = line.strip(self._around)
+        if not content or content.startswith(self._comments) or line.strip() in self.header:
+            return None
+        start = line.split(self._comment)[0]
+        row = line if start.count('"') % 2 else start
+        return split_line(row.strip(self._around), self.delimiter)
 
 
 def split_line(line: str, delimiter: str | None) -> list[str]:
@@ -305,27 +323,27 @@ def _read(path: Path) -> tuple[bytes, list[str]]:
     """
     try:
         with readable(path):
-            content = path.read_bytes()
-            content = gzip.decompress(content) if content.startswith(GZIP) else content
+            text = path.read_bytes()
+            text = gzip.decompress(text) if text.startswith(GZIP) else text
     except (gzip.BadGzipFile, EOFError, zlib.error):
         raise InputError(f"{path}: not a whole gzip file") from None
-    if not content.isascii() or 0 in content[:4096]:
-        encoding = _encoding_of(content[:4096])
+    if not text.isascii() or 0 in text[:4096]:
+        encoding = _encoding_of(text[:4096])
         try:
-            content = content.decode(encoding).encode()
+            text = text.decode(encoding).encode()
         except UnicodeDecodeError:  # what is no UTF-8 is mostly that of a Western Windows
             encoding = "cp1252" if encoding.startswith("utf-8") else encoding
-            content = content.decode(encoding, errors="replace").encode()
-    if b"\r" in content:
-        content = content.replace(b"\r\n", b"\n").replace(b"\r", b"\n")
-    first = content[:_PREVIEW].split(b"\n")
+            text = text.decode(encoding, errors="replace").encode()
+    if b"\r" in text:
+        text = text.replace(b"\r\n", b"\n").replace(b"\r", b"\n")
+    first = text[:_PREVIEW].split(b"\n")
     labels, lines = Counter(tuple(_LABEL.findall(line)) for line in first).most_common(1)[0]
     if len(labels) < 3 or lines < len(first) / 3:
-        return content, []
+        return text, []
     parts = (rb"(.*?)(?<![\w.])%b[ \t]*[:=][ \t]*" % re.escape(label) for label in labels)
     row = re.compile(rb"^(?:%b(.*)|.*)$" % b"".join(parts), re.MULTILINE)
-    content = row.sub(lambda line: b"".join(part or b"" for part in line.groups()), content)
-    return content, [label.decode() for label in labels]
+    text = row.sub(lambda line: b"".join(part or b"" for part in line.groups()), text)
+    return text, [label.decode() for label in labels]
 
 
 def _encoding_of(start: bytes) -> str:
