@@ -15,8 +15,7 @@ from scipy import special
 from accelstudy.adjustment.quality import GlobalTest, Solution, global_test, suspects
 from accelstudy.approaches import Approach
 from accelstudy.basics.progress import stage
-from accelstudy.campaign.calibration.assessment import OUTLIER_LEVEL
-from accelstudy.campaign.calibration.fit import JudgedNoise
+from accelstudy.campaign.calibration.campaign_fit import OUTLIER_LEVEL, JudgedNoise
 from accelstudy.campaign.gross_errors.recognition import Recognition
 from accelstudy.campaign.session import Campaign
 from accelstudy.diagnosis.consequences import TiltErrors, tilt_errors

@@ -22,15 +22,10 @@ from accelstudy.basics.names import path_name
 from accelstudy.basics.progress import say, show
 from accelstudy.basics.units import GON, MGON, shown_unit, to_display
 from accelstudy.basics.wording import probability
-from accelstudy.campaign.calibration.assessment import tilt_left
+from accelstudy.campaign.calibration.campaign_fit import CampaignFit, JudgedNoise
 from accelstudy.campaign.calibration.figures import SUSPECT
 from accelstudy.campaign.calibration.file_format import CalibrationDocument
-from accelstudy.campaign.calibration.fit import (
-    CampaignFit,
-    JudgedNoise,
-    fit_campaign,
-    usual_approach,
-)
+from accelstudy.campaign.calibration.fit import fit_campaign, usual_approach
 from accelstudy.campaign.calibration.result import Calibration
 from accelstudy.campaign.sensor_type import TYPE_FILE
 from accelstudy.campaign.session import Campaign
@@ -351,7 +346,7 @@ def _squared_error(fit: CampaignFit, model: SensorModel) -> Array:
     error = tilt_error(
         fit.model, fit.parameters, model, base.parameters, f_b, fit.gravity, hold
     ).constant
-    by_noise = tilt_left(fit).parameters ** 2 - tilt_left(base).parameters ** 2
+    by_noise = fit.tilt.parameters**2 - base.tilt.parameters**2
     return np.asarray(error - by_noise)
 
 

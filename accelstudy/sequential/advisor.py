@@ -13,9 +13,8 @@ from accelstudy.approaches import Approach, get_approach
 from accelstudy.basics import suggestions
 from accelstudy.basics.errors import InputError
 from accelstudy.basics.levels import IMPLAUSIBLE, REJECTED
-from accelstudy.campaign.calibration.assessment import Assessment, tilt_left
+from accelstudy.campaign.calibration.campaign_fit import CampaignFit
 from accelstudy.campaign.calibration.fit import (
-    CampaignFit,
     angle_errors,
     campaign_estimability,
     campaign_noise,
@@ -117,13 +116,12 @@ def advise(
         If no number of positions would be enough.
     """
     _check(campaign, model, approach)
-    assessed, n = _assessed(campaign, model, approach), campaign.n_positions
-    fit = None if assessed is None else assessed.fit
+    fit, n = _fit(campaign, model, approach), campaign.n_positions
     known, at = _knowledge(campaign, model, approach, fit)
 
     stated = campaign.sigma_force is not None
     trusted = stated if fit is None else fit.trusts_sigma
-    wrong = assessed is not None and assessed.state in (REJECTED, IMPLAUSIBLE)
+    wrong = fit is not None and fit.state in (REJECTED, IMPLAUSIBLE)
     noise = campaign_noise(campaign)
     if fit is not None:
         noise = replace(noise, sigma_force=float(np.mean(np.asarray(fit.observed.sigma_force))))
@@ -140,7 +138,7 @@ def advise(
     )
     rms = chooser.rms(known)
     if fit is not None and stated:
-        rms = tilt_left(fit, promise.tilt_range).total
+        rms = fit.tilt_left(promise.tilt_range).total
     enough = bool(promise.is_kept(rms)) and not wrong
 
     last = -campaign.forces[-1] / np.linalg.norm(campaign.forces[-1]) if n else None
@@ -150,16 +148,15 @@ def advise(
     if foreseeable and not enough and not wrong:
         variance = 1.0 if trusted else known.omega / known.redundancy
         to_go = chooser.positions_to_go(known, variance, rms, last)
-    suspects = () if assessed is None else assessed.suspects
     seen, taken = _sigmas(known, campaign.sigma_force, trusted, noise.sigma_force)
     advice = Advice(
         session=campaign,
         model=model,
         approach=approach,
         promise=promise,
-        p_last=np.nan if assessed is None else float(assessed.p_adjusted[-1]),
-        in_conflict=tuple(sorted(int(campaign.positions[s.position]) for s in suspects)),
-        calibration_state="" if assessed is None else assessed.state,
+        p_last=np.nan if fit is None else float(fit.p_adjusted[-1]),
+        in_conflict=() if fit is None else tuple(sorted(fit.suspects)),
+        calibration_state="" if fit is None else fit.state,
         undetermined=() if known.determined else _undetermined(campaign, model, approach, known),
         sigma_seen=seen,
         sigma_taken=taken,
@@ -173,12 +170,12 @@ def advise(
     return advice if last is None or advice.repeats is None else replace(advice, next=last)
 
 
-def _assessed(campaign: Campaign, model: SensorModel, approach: Approach) -> Assessment | None:
-    """Assess the calibration of the session so far; None if there is none."""
+def _fit(campaign: Campaign, model: SensorModel, approach: Approach) -> CampaignFit | None:
+    """Calibrate the session so far; None if that is not possible yet."""
     if not campaign.n_positions:
         return None
     try:
-        return Assessment(fit_campaign(campaign, model, approach))
+        return fit_campaign(campaign, model, approach)
     except InputError:  # it is not determined yet, or does not converge
         return None
 

@@ -8,7 +8,8 @@ from typing import Any
 
 from accelstudy.approaches import Approach, get_approach
 from accelstudy.basics.arguments import check_type, path_of
-from accelstudy.campaign.calibration.fit import CampaignFit, fit_campaign
+from accelstudy.campaign.calibration.campaign_fit import CampaignFit
+from accelstudy.campaign.calibration.fit import fit_campaign
 from accelstudy.campaign.format import read_campaign
 from accelstudy.campaign.sensor_type import with_type
 from accelstudy.campaign.session import Campaign

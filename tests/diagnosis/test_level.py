@@ -8,7 +8,6 @@ from diagnosis_helpers import campaign, design, shuffled
 from usual import GRAVITY, NINE, ROBOT
 
 from accelstudy.basics.levels import REFUTATION_LEVEL
-from accelstudy.campaign.calibration.assessment import Assessment
 from accelstudy.campaign.calibration.fit import fit_campaign
 from accelstudy.campaign.calibration.wording import verdict_lines as calibrated_lines
 from accelstudy.diagnosis.decision.problem import SEED, BaseFit, Problem
@@ -84,7 +83,7 @@ def test_a_diagnosis_decides_at_the_levels(known, level):
     same of it; without a stated sigma, a calibration cannot accept any.
     """
     measured = campaign(1, scheme="mclaren-24", sigma_known=known)
-    says = calibrated_lines(Assessment(fit_campaign(measured, NINE, ROBOT)))
+    says = calibrated_lines(fit_campaign(measured, NINE, ROBOT))
     problem = diagnose(measured, NINE).problem
     for p, verdict, weak in (
         (level + 1e-6, "no_effect", False),

@@ -12,7 +12,6 @@ from calling import call, refusal, succeed
 
 import accelstudy as acs
 from accelstudy.approaches import get_approach
-from accelstudy.campaign.calibration.assessment import Assessment
 from accelstudy.campaign.calibration.document import calibration_document
 from accelstudy.campaign.calibration.export import export
 from accelstudy.campaign.calibration.fit import fit_campaign
@@ -196,7 +195,7 @@ def test_the_rig_stays_where_it_was(tmp_path):
     campaign = acs.simulate_campaign(scheme="fibonacci-30", order="random")
     model = get_model("bias+encoder_scale+scale+nonorthogonality")
     fit = fit_campaign(campaign, model, get_approach("robot"))
-    content = calibration_document(Assessment(fit))
+    content = calibration_document(fit)
     path = tmp_path / "calibration.json"
     path.write_text(json.dumps(content), encoding="utf-8")
     sensor = np.delete(np.arange(11), [3, 4])

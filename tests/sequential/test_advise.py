@@ -16,7 +16,6 @@ from places import ROOT
 from accelstudy.adjustment import calibrate
 from accelstudy.approaches import get_approach
 from accelstudy.basics.units import GON, MGON
-from accelstudy.campaign.calibration.assessment import Assessment
 from accelstudy.campaign.calibration.fit import fit_campaign
 from accelstudy.campaign.format import read_campaign
 from accelstudy.leveling.angles import specific_force
@@ -192,14 +191,14 @@ def test_it_judges_as_the_calibration_does(begun, n, bumped):
     advice = advice_for(
         measured, get_model(MODEL), get_approach("gravity"), promise, candidate_positions("cube")
     )
-    calibrated = Assessment(fit_campaign(measured, get_model(MODEL), get_approach("gravity")))
+    calibrated = fit_campaign(measured, get_model(MODEL), get_approach("gravity"))
     assert (
         advice.calibration_state
         == calibrated.state
         == ("rejected" if bumped else "accepted" if n > 11 else "cannot tell")
     )
     np.testing.assert_allclose(advice.rms, calibrated.tilt.total, rtol=1e-12)
-    suspects = [int(measured.positions[s.position]) for s in calibrated.suspects]
+    suspects = [*calibrated.suspects]
     assert list(advice.in_conflict) == sorted(suspects)
     assert advice.enough == (not bumped)
 
@@ -225,7 +224,7 @@ def test_it_never_says_enough_where_the_calibration_is_rejected():
             forces = drawn.forces[0, :n]
             campaign = made(forces, sigma=sigma)
             advice = advice_for(campaign, model, by, promise, directions)
-            state = Assessment(fit_campaign(campaign, model, by)).state
+            state = fit_campaign(campaign, model, by).state
             assert advice.calibration_state == state
             assert not (advice.enough and state in ("rejected", "implausible"))
             seen.append((state == "rejected", advice.enough))

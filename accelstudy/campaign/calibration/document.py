@@ -8,7 +8,7 @@ import numpy as np
 import pandas as pd
 
 from accelstudy.basics.units import MGON, recorded_unit, to_recorded
-from accelstudy.campaign.calibration.assessment import Assessment
+from accelstudy.campaign.calibration.campaign_fit import CampaignFit
 from accelstudy.campaign.calibration.file_format import CalibrationDocument
 from accelstudy.campaign.calibration.sensor_calibration import FORCES
 from accelstudy.campaign.calibration.wording import verdict_lines
@@ -16,12 +16,11 @@ from accelstudy.leveling.error import MAX_TILT_GON
 from accelstudy.sensors.frames import FRD
 
 
-def calibration_document(assessment: Assessment) -> dict[str, Any]:
+def calibration_document(fit: CampaignFit) -> dict[str, Any]:
     """Describe a calibration: parameters with sigmas, correlation, accuracy, matrix and quality.
 
     All numbers are in SI but those whose key names another unit, and in forward, right, down.
     """
-    fit = assessment.fit
     campaign, adjustment = fit.campaign, fit.adjustment
     header = campaign.header
     covariance, sigma = fit.covariance, fit.sigma
@@ -90,28 +89,24 @@ def calibration_document(assessment: Assessment) -> dict[str, Any]:
         },
         "log": header.log and header.log.model_dump(exclude_none=True, by_alias=True),
         "warnings": campaign.warnings,
-        "quality": _quality(assessment),
+        "quality": _quality(fit),
     }
     return CalibrationDocument.content(content)
 
 
-def _quality(assessment: Assessment) -> dict[str, Any]:
+def _quality(fit: CampaignFit) -> dict[str, Any]:
     """How good a calibration is."""
-    held, components, tilt = assessment.held_out, assessment.components, assessment.tilt
+    held, components, tilt = fit.held_out, fit.components, fit.tilt
     angles = None if held is None else held.rms_angles
     parts = {"": tilt.total, "parameters_": tilt.parameters, "reference_": tilt.reference}
-    positions = assessment.fit.campaign.positions
     return {
-        "state": assessment.state,
-        "plausible": not assessment.warnings,
-        "warnings": assessment.warnings,
-        "gross_error": assessment.gross_error,
-        "verdict": " ".join(verdict_lines(assessment)),
-        "global_test": assessment.fit.global_test,
-        "suspects": [
-            {"position": int(positions[s.position]), "p_value": s.p_value}
-            for s in assessment.suspects
-        ],
+        "state": fit.state,
+        "plausible": not fit.warnings,
+        "warnings": fit.warnings,
+        "gross_error": fit.gross_error,
+        "verdict": " ".join(verdict_lines(fit)),
+        "global_test": fit.global_test,
+        "suspects": [{"position": n, "p_value": p} for n, p in fit.suspects.items()],
         "held_out": None
         if held is None or held.n_predicted == 0
         else {
@@ -139,33 +134,32 @@ def _quality(assessment: Assessment) -> dict[str, Any]:
     }
 
 
-def assessed_positions(assessment: Assessment) -> pd.DataFrame:
+def assessed_positions(fit: CampaignFit) -> pd.DataFrame:
     """One row per position: residuals, tests and reliability, in the units that the names say."""
-    fit, tests, reliability = assessment.fit, assessment.tests, assessment.reliability
+    tests, reliability = fit.tests, fit.reliability
     scale = np.sqrt(fit.variance_factor)  # reliability is in terms of the a-priori noise
     table = pd.DataFrame(
         {
             "position": fit.campaign.positions,
             "norm_residual_mps2": fit.norm_residuals,
-            "redundancy": assessment.solution.redundancy_numbers,
+            "redundancy": fit.solution.redundancy_numbers,
             "statistic": tests.statistic,
             "dof": tests.dof,
             "p_value": tests.p_known if fit.trusts_sigma else tests.p_unknown,
-            "p_value_adjusted": assessment.p_adjusted,
+            "p_value_adjusted": fit.p_adjusted,
             "tau": tests.tau,
             "mdb_mps2": scale * reliability.mdb[:, -1],
             "external_roll_mgon": scale * reliability.leveling[:, 0] / MGON,
             "external_pitch_mgon": scale * reliability.leveling[:, 1] / MGON,
         }
     )
-    residuals = assessment.solution.residuals
+    residuals = fit.solution.residuals
     for i, name in enumerate(("fx", "fy", "fz")):
         table[f"v_{name}_mps2"] = residuals[:, i]
     if fit.approach.uses_angles:
         for i, name in enumerate(("roll", "pitch")):
             table[f"v_{name}_mgon"] = residuals[:, 3 + i] / MGON
-    if assessment.held_out is not None:
-        table["held_out_mps2"] = np.linalg.norm(assessment.held_out.misclosures, axis=1)
-    suspects = {s.position for s in assessment.suspects}
-    table["suspect"] = [i in suspects for i in range(len(table))]
+    if fit.held_out is not None:
+        table["held_out_mps2"] = np.linalg.norm(fit.held_out.misclosures, axis=1)
+    table["suspect"] = table["position"].isin([*fit.suspects])
     return table

@@ -7,7 +7,7 @@ import pandas as pd
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from accelstudy.campaign.calibration.fit import CampaignFit
+from accelstudy.campaign.calibration.campaign_fit import CampaignFit
 from accelstudy.drawing.style import FULL, INK, approach_colour, matrix, new_figure, symbol
 
 SUSPECT = "#D55E00"

@@ -2,26 +2,19 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
-from functools import cached_property, partial
+from dataclasses import replace
+from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
 
-from accelstudy.adjustment import Adjustment, Observations, calibrate
+from accelstudy.adjustment import Observations, calibrate
 from accelstudy.adjustment.observations import AngleErrors
-from accelstudy.adjustment.quality import (
-    GlobalTest,
-    Solution,
-    global_test,
-    pooled_variance,
-    solve,
-)
 from accelstudy.approaches import Approach, get_approach
 from accelstudy.basics.errors import InputError
-from accelstudy.basics.shares import sigmas_95
 from accelstudy.basics.units import MGON
 from accelstudy.basics.wording import words
+from accelstudy.campaign.calibration.campaign_fit import CampaignFit
 from accelstudy.campaign.columns import COLUMNS
 from accelstudy.campaign.gross_errors.recognition import recognise
 from accelstudy.campaign.importing.noise import fit_sphere
@@ -47,178 +40,6 @@ UNIT_SIGMA = 1e-3
 CHEAP_SIGMA = 1e-2
 """m/s², of the means of a cheap sensor: what positions must determine a model by where neither the
 campaign nor residuals tell the noise."""
-
-
-@dataclass(frozen=True)
-class JudgedNoise:
-    """A judgement of the noise of a campaign.
-
-    Attributes
-    ----------
-    trusted : bool, whether the campaign states its noise and nothing refutes it
-    variance : float, variance of unit weight to quote; 1 where the stated noise is trusted
-    """
-
-    trusted: bool
-    variance: float
-
-
-@dataclass(frozen=True, eq=False)
-class CampaignFit:
-    """A calibrated campaign.
-
-    Attributes
-    ----------
-    campaign, model, approach : what was fitted, with what
-    observed : Observations, R = 1
-    adjustment : Adjustment, R = 1
-    estimability : Estimability, of the campaign's own positions
-    judged : JudgedNoise, from a diagnosis; by default the global test of this fit judges the noise
-    """
-
-    campaign: Campaign
-    model: SensorModel
-    approach: Approach
-    observed: Observations
-    adjustment: Adjustment
-    estimability: Estimability
-    judged: JudgedNoise | None = None
-
-    @property
-    def sigma_known(self) -> bool:
-        """Whether the campaign gives the noise of its position means."""
-        return self.campaign.sigma_force is not None
-
-    @property
-    def parameters(self) -> Array:
-        """Estimates of the model's parameters, (u,), SI."""
-        return self.adjustment.parameters[0, : self.model.n_parameters]
-
-    @property
-    def global_test(self) -> GlobalTest | None:
-        """Test of the whole model; None where sigma is unknown or there is no redundancy."""
-        if not self.sigma_known:
-            return None
-        return global_test(self._omega, self.adjustment.redundancy, sigma_dof=self.sigma_dof)
-
-    @property
-    def _omega(self) -> float:
-        return float(self.adjustment.omega[0])
-
-    @cached_property
-    def solution(self) -> Solution:
-        """The adjustment, linearised at the estimates."""
-        return solve(self.model, self.approach, self.observed, self.adjustment)
-
-    @property
-    def sigma_dof(self) -> float:
-        """Degrees of freedom of the stated noise in Ω; infinite where it is known."""
-        stated = self.observed.sigma_dof
-        return self.solution.sigma_dof if np.isfinite(stated) else stated
-
-    @cached_property
-    def noise(self) -> JudgedNoise:
-        """The noise that is quoted, as a diagnosis or the global test judged it.
-
-        A stated noise is trusted unless the residuals refute it. If it is itself an estimate it is
-        pooled with the residuals; if it is not trusted the noise is that of the residuals.
-        """
-        if self.judged is not None:
-            return self.judged
-        test, r = self.global_test, self.adjustment.redundancy
-        if self.sigma_known and (test is None or test.accepted):
-            return JudgedNoise(True, pooled_variance(self._omega, r, self.sigma_dof))
-        return JudgedNoise(False, float(self.adjustment.variance_posteriori[0]))
-
-    @property
-    def trusts_sigma(self) -> bool:
-        """Whether the a-priori noise is quoted."""
-        return self.noise.trusted
-
-    @property
-    def variance_factor(self) -> float:
-        """Variance of unit weight to quote."""
-        return self.noise.variance
-
-    @property
-    def dof(self) -> float:
-        """Degrees of freedom of the noise that is quoted; infinite where it is known."""
-        r = self.adjustment.redundancy
-        return self.sigma_dof + r if self.trusts_sigma else r
-
-    @property
-    def is_noise_known(self) -> bool:
-        """Whether the quoted noise is known, and no estimate."""
-        return bool(np.isinf(self.dof))
-
-    @property
-    def sigma_position(self) -> float:
-        """Noise of a position mean to quote, m/s²: as stated if trusted, else a posteriori."""
-        return self._sigma_taken * float(np.sqrt(self.variance_factor))
-
-    @property
-    def sigma_position_posteriori(self) -> float:
-        """Noise of a position mean from the residuals, m/s²; NaN without redundancy."""
-        factor = float(self.adjustment.variance_posteriori[0])
-        return self._sigma_taken * float(np.sqrt(factor))
-
-    @property
-    def _sigma_taken(self) -> float:
-        """Noise of a position mean of unit weight, m/s²."""
-        return float(np.mean(np.asarray(self.observed.sigma_force)))
-
-    @property
-    def covariance(self) -> Array:
-        """Covariance matrix of the model's parameters to quote, (u, u), SI."""
-        u = self.model.n_parameters
-        return self.variance_factor * self.adjustment.cofactors[0, :u, :u]
-
-    @property
-    def by_reference(self) -> Array | None:
-        """Part of `covariance` that the calibration of a reference causes, (u, u), SI.
-
-        It is what would be gone if that calibration had no errors: Q_xc Q_cc⁻¹ Q_cx, with the
-        errors c that all holds share. None where no reference was used.
-        """
-        if self.observed.common is None or not self.approach.uses_angles:
-            return None
-        q, u = self.adjustment.cofactors[0], self.model.n_parameters
-        shared = slice(u, u + self.observed.common.shape[-1])
-        part = q[:u, shared] @ np.linalg.solve(q[shared, shared], q[shared, :u])
-        return self.variance_factor * part
-
-    @property
-    def sigma(self) -> Array:
-        """Standard deviations of the parameters to quote, (u,), SI."""
-        return np.sqrt(np.diag(self.covariance))
-
-    @property
-    def sigmas_95(self) -> float:
-        """Number of quoted sigmas on either side that hold 95 %; by Student's t of an estimate."""
-        return sigmas_95(self.dof)
-
-    @property
-    def gravity(self) -> float:
-        """Gravity, m/s²: the adjusted value if it was observed."""
-        if self.campaign.header.gravity.sigma_mps2 > 0:
-            return float(self.adjustment.parameters[0, -1])
-        return self.campaign.gravity
-
-    @property
-    def corrected(self) -> Array:
-        """Calibrated specific forces of the holds, (n, 3), m/s²."""
-        campaign = self.campaign
-        return self.model.correct(campaign.forces, self.parameters, self.gravity, campaign.hold)
-
-    @property
-    def norm_residuals(self) -> Array:
-        """|f_b| − g of the holds, (n,), m/s²."""
-        return np.linalg.norm(self.corrected, axis=1) - self.gravity
-
-    @property
-    def rms_norm_residual(self) -> float:
-        """Rms of |f_b| − g over the holds, m/s²."""
-        return float(np.sqrt(np.mean(self.norm_residuals**2)))
 
 
 def usual_approach(campaign: Campaign) -> Approach:

@@ -19,7 +19,7 @@ from accelstudy.basics.progress import say, show, warn
 from accelstudy.basics.suggestions import HERE
 from accelstudy.basics.units import GON, InputQuantity
 from accelstudy.campaign.calibration import export, wording
-from accelstudy.campaign.calibration.assessment import Assessment, tilt_left
+from accelstudy.campaign.calibration.campaign_fit import CampaignFit
 from accelstudy.campaign.calibration.document import assessed_positions, calibration_document
 from accelstudy.campaign.calibration.figures import (
     correlation_figure,
@@ -27,7 +27,6 @@ from accelstudy.campaign.calibration.figures import (
     residual_figure,
 )
 from accelstudy.campaign.calibration.file_format import CalibrationDocument
-from accelstudy.campaign.calibration.fit import CampaignFit
 from accelstudy.campaign.calibration.sensor_calibration import SensorCalibration, calibration_of
 from accelstudy.drawing.saving import save_all
 from accelstudy.files.outputs import CALIBRATION
@@ -62,7 +61,7 @@ class Calibration(Result):
     ) -> None:
         self.fit, self.source = fit, Path("CAMPAIGN") if source is None else source
         if content is None:
-            content = calibration_document(self._assessment)
+            content = calibration_document(self._fitted("content"))
         self._content = content
         self.name = str(content["campaign"])
 
@@ -139,11 +138,7 @@ class Calibration(Result):
     @cached_property
     def residuals(self) -> pd.DataFrame:
         """Residuals, tests and reliability of each position, as positions.parquet has them."""
-        return assessed_positions(self._assessment)
-
-    @cached_property
-    def _assessment(self) -> Assessment:
-        return Assessment(self._fitted("residuals"))
+        return assessed_positions(self._fitted("residuals"))
 
     def tilt_error(self, tilt_range: float | str = MAX_TILT_GON * GON) -> pd.Series:
         """Return the rms tilt error that the calibration leaves, rad, of roll and of pitch.
@@ -155,7 +150,7 @@ class Calibration(Result):
         ----------
         tilt_range : float in rad or str with a unit, largest tilt
         """
-        left = tilt_left(self._fitted("tilt_error"), quantity("tilt_range", tilt_range, TILT))
+        left = self._fitted("tilt_error").tilt_left(quantity("tilt_range", tilt_range, TILT))
         return pd.Series(left.total, index=["roll", "pitch"], name="tilt_error_rad")
 
     def _fitted(self, what: str) -> CampaignFit:
@@ -207,7 +202,7 @@ class Calibration(Result):
 
     def _write_page(self, fit: CampaignFit, folder: Path, place: Path) -> None:
         """Write positions.parquet, figures/ and report.html."""
-        positions, lines = self.residuals, wording.verdict_lines(self._assessment)
+        positions, lines = self.residuals, wording.verdict_lines(fit)
         drawn = save_all(
             {
                 "residuals": lambda: residual_figure(fit, positions),

@@ -12,7 +12,8 @@ from accelstudy.adjustment import calibrate
 from accelstudy.basics.errors import InputError
 from accelstudy.basics.progress import track
 from accelstudy.basics.units import display_unit, to_display
-from accelstudy.campaign.calibration.fit import CampaignFit, campaign_noise
+from accelstudy.campaign.calibration.campaign_fit import CampaignFit
+from accelstudy.campaign.calibration.fit import campaign_noise
 from accelstudy.simulation.sessions import BLOCK, session, with_angle_errors
 
 AT_ONCE = 500_000

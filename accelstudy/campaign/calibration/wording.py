@@ -13,8 +13,7 @@ from accelstudy.basics import suggestions
 from accelstudy.basics.levels import ACCEPTED, BLIND, IMPLAUSIBLE, REJECTED
 from accelstudy.basics.units import GON, display_unit
 from accelstudy.basics.wording import estimate
-from accelstudy.campaign.calibration.assessment import Assessment
-from accelstudy.campaign.calibration.fit import CampaignFit
+from accelstudy.campaign.calibration.campaign_fit import CampaignFit
 from accelstudy.campaign.importing.noise import steps_text
 from accelstudy.leveling.error import MAX_TILT_GON
 from accelstudy.pages import render_lines
@@ -34,19 +33,16 @@ def parameter_lines(content: Mapping[str, Any]) -> list[str]:
     return shown
 
 
-def verdict_lines(assessment: Assessment) -> list[str]:
+def verdict_lines(fit: CampaignFit) -> list[str]:
     """Say how good the calibration is, for what, and what limits it; the verdict comes first."""
-    fit, state, shares = assessment.fit, assessment.state, assessment.tilt.shares
+    state, shares = fit.state, fit.tilt.shares
     steps = fit.campaign.header.resolution_mps2
-    says_tilt = state != IMPLAUSIBLE and np.isfinite(assessment.tilt.total).all()
-    suspects = {
-        int(fit.campaign.positions[suspect.position]): suspect.p_value
-        for suspect in sorted(assessment.suspects, key=lambda suspect: suspect.position)
-    }
+    says_tilt = state != IMPLAUSIBLE and np.isfinite(fit.tilt.total).all()
+    suspects = dict(sorted(fit.suspects.items()))
     return render_lines(
         TEMPLATE,
         "verdict",
-        assessment=assessment,
+        fit=fit,
         suspects=suspects,
         limit=max(shares, key=lambda name: float(shares[name].max())) if says_tilt else "",
         max_tilt=MAX_TILT_GON * GON,

@@ -16,7 +16,7 @@ from scipy import special
 
 from accelstudy.adjustment.quality import Solution, global_test, pooled_variance
 from accelstudy.basics.levels import REFUTATION_LEVEL
-from accelstudy.campaign.calibration.fit import JudgedNoise
+from accelstudy.campaign.calibration.campaign_fit import JudgedNoise
 from accelstudy.campaign.session import Campaign
 from accelstudy.diagnosis.evidence.detection import Chance
 from accelstudy.diagnosis.rules import RULES

@@ -15,9 +15,9 @@ from accelstudy.adjustment.quality import Solution
 from accelstudy.basics import plugins
 from accelstudy.basics.names import MAX_NAME_BYTES
 from accelstudy.basics.units import GON, MGON
-from accelstudy.campaign.calibration.assessment import Assessment
+from accelstudy.campaign.calibration.campaign_fit import CampaignFit
 from accelstudy.campaign.calibration.document import calibration_document
-from accelstudy.campaign.calibration.fit import CampaignFit, campaign_estimability
+from accelstudy.campaign.calibration.fit import campaign_estimability
 from accelstudy.diagnosis.consequences import TiltErrors
 from accelstudy.diagnosis.decision.statement import Part
 from accelstudy.diagnosis.report.file_format import DiagnosisDocument
@@ -176,7 +176,7 @@ def diagnosed_calibration(diagnosis: CampaignDiagnosis) -> dict[str, Any]:
         If the fit cannot be assessed.
     """
     fit = diagnosed_fit(diagnosis)
-    content = calibration_document(Assessment(fit))
+    content = calibration_document(fit)
     if (recognised := diagnosis.recognised) is not None:
         matrix = recognised.matrix
         content["mended"] = {

@@ -1,0 +1,344 @@
+"""A calibrated campaign: its parameters with their sigmas, and how good they are."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+from accelstudy.adjustment import Adjustment, Observations, quality
+from accelstudy.adjustment.components import VarianceComponents, variance_components
+from accelstudy.approaches import Approach
+from accelstudy.basics.levels import ACCEPTED, IMPLAUSIBLE, REJECTED, UNCHECKED
+from accelstudy.basics.shares import sigmas_95
+from accelstudy.basics.units import GON
+from accelstudy.campaign.gross_errors.recognition import Recognition, recognise
+from accelstudy.campaign.session import Campaign
+from accelstudy.design.estimability import Estimability
+from accelstudy.leveling.angles import tilt_by_output, tilt_slope
+from accelstudy.leveling.error import ATTITUDES, MAX_TILT_GON, cap_forces, holds_in_use
+from accelstudy.sensors.plausibility import implausible_parameters, implausible_tilt
+from accelstudy.sensors.sensor import SensorModel
+
+Array = NDArray[np.float64]
+
+OUTLIER_LEVEL = 0.05
+"""Family-wise level of the tests of single positions."""
+
+
+@dataclass(frozen=True)
+class TiltLeft:
+    """Rms tilt error that a calibration leaves, without the noise of a reading.
+
+    Each is a (2,) array, rad, of roll and of pitch, over all tilts up to a largest one. Effects
+    that depend on temperature or time have those of the campaign. Effects of the rig have no share:
+    the sensor in use has left the rig.
+
+    Attributes
+    ----------
+    shares : mapping of effect to what the uncertainty of its parameters leaves
+    parameters : of all parameters together
+    reference : the part of it that the calibration of a reference causes; None without one
+    missing : of a reading that is wrong by as much as the residuals exceed the stated noise; 0
+        where they do not refute it
+    """
+
+    shares: Mapping[str, Array]
+    parameters: Array
+    reference: Array | None
+    missing: Array
+
+    @property
+    def total(self) -> Array:
+        """Tilt error by the parameters and by what the model lacks together."""
+        return np.hypot(self.parameters, self.missing)
+
+
+@dataclass(frozen=True)
+class JudgedNoise:
+    """A judgement of the noise of a campaign.
+
+    Attributes
+    ----------
+    trusted : bool, whether the campaign states its noise and nothing refutes it
+    variance : float, variance of unit weight to quote; 1 where the stated noise is trusted
+    """
+
+    trusted: bool
+    variance: float
+
+
+@dataclass(frozen=True, eq=False)
+class CampaignFit:
+    """A calibrated campaign.
+
+    Attributes
+    ----------
+    campaign, model, approach : what was fitted, with what
+    observed : Observations, R = 1
+    adjustment : Adjustment, R = 1
+    estimability : Estimability, of the campaign's own positions
+    judged : JudgedNoise, from a diagnosis; by default the global test of this fit judges the noise
+    """
+
+    campaign: Campaign
+    model: SensorModel
+    approach: Approach
+    observed: Observations
+    adjustment: Adjustment
+    estimability: Estimability
+    judged: JudgedNoise | None = None
+
+    @property
+    def sigma_known(self) -> bool:
+        """Whether the campaign gives the noise of its position means."""
+        return self.campaign.sigma_force is not None
+
+    @property
+    def parameters(self) -> Array:
+        """Estimates of the model's parameters, (u,), SI."""
+        return self.adjustment.parameters[0, : self.model.n_parameters]
+
+    @property
+    def global_test(self) -> quality.GlobalTest | None:
+        """Test of the whole model; None where sigma is unknown or there is no redundancy."""
+        if not self.sigma_known:
+            return None
+        return quality.global_test(
+            self._omega, self.adjustment.redundancy, sigma_dof=self.sigma_dof
+        )
+
+    @property
+    def _omega(self) -> float:
+        return float(self.adjustment.omega[0])
+
+    @cached_property
+    def solution(self) -> quality.Solution:
+        """The adjustment, linearised at the estimates."""
+        return quality.solve(self.model, self.approach, self.observed, self.adjustment)
+
+    @property
+    def sigma_dof(self) -> float:
+        """Degrees of freedom of the stated noise in Ω; infinite where it is known."""
+        stated = self.observed.sigma_dof
+        return self.solution.sigma_dof if np.isfinite(stated) else stated
+
+    @cached_property
+    def noise(self) -> JudgedNoise:
+        """The noise that is quoted, as a diagnosis or the global test judged it.
+
+        A stated noise is trusted unless the residuals refute it. If it is itself an estimate it is
+        pooled with the residuals; if it is not trusted the noise is that of the residuals.
+        """
+        if self.judged is not None:
+            return self.judged
+        test, r = self.global_test, self.adjustment.redundancy
+        if self.sigma_known and (test is None or test.accepted):
+            return JudgedNoise(True, quality.pooled_variance(self._omega, r, self.sigma_dof))
+        return JudgedNoise(False, float(self.adjustment.variance_posteriori[0]))
+
+    @property
+    def trusts_sigma(self) -> bool:
+        """Whether the a-priori noise is quoted."""
+        return self.noise.trusted
+
+    @property
+    def variance_factor(self) -> float:
+        """Variance of unit weight to quote."""
+        return self.noise.variance
+
+    @property
+    def dof(self) -> float:
+        """Degrees of freedom of the noise that is quoted; infinite where it is known."""
+        r = self.adjustment.redundancy
+        return self.sigma_dof + r if self.trusts_sigma else r
+
+    @property
+    def is_noise_known(self) -> bool:
+        """Whether the quoted noise is known, and no estimate."""
+        return bool(np.isinf(self.dof))
+
+    @property
+    def sigma_position(self) -> float:
+        """Noise of a position mean to quote, m/s²: as stated if trusted, else a posteriori."""
+        return self._sigma_taken * float(np.sqrt(self.variance_factor))
+
+    @property
+    def sigma_position_posteriori(self) -> float:
+        """Noise of a position mean from the residuals, m/s²; NaN without redundancy."""
+        factor = float(self.adjustment.variance_posteriori[0])
+        return self._sigma_taken * float(np.sqrt(factor))
+
+    @property
+    def _sigma_taken(self) -> float:
+        """Noise of a position mean of unit weight, m/s²."""
+        return float(np.mean(np.asarray(self.observed.sigma_force)))
+
+    @property
+    def covariance(self) -> Array:
+        """Covariance matrix of the model's parameters to quote, (u, u), SI."""
+        u = self.model.n_parameters
+        return self.variance_factor * self.adjustment.cofactors[0, :u, :u]
+
+    @property
+    def by_reference(self) -> Array | None:
+        """Part of `covariance` that the calibration of a reference causes, (u, u), SI.
+
+        It is what would be gone if that calibration had no errors: Q_xc Q_cc⁻¹ Q_cx, with the
+        errors c that all holds share. None where no reference was used.
+        """
+        if self.observed.common is None or not self.approach.uses_angles:
+            return None
+        q, u = self.adjustment.cofactors[0], self.model.n_parameters
+        shared = slice(u, u + self.observed.common.shape[-1])
+        part = q[:u, shared] @ np.linalg.solve(q[shared, shared], q[shared, :u])
+        return self.variance_factor * part
+
+    @property
+    def sigma(self) -> Array:
+        """Standard deviations of the parameters to quote, (u,), SI."""
+        return np.sqrt(np.diag(self.covariance))
+
+    @property
+    def sigmas_95(self) -> float:
+        """Number of quoted sigmas on either side that hold 95 %; by Student's t of an estimate."""
+        return sigmas_95(self.dof)
+
+    @property
+    def gravity(self) -> float:
+        """Gravity, m/s²: the adjusted value if it was observed."""
+        if self.campaign.header.gravity.sigma_mps2 > 0:
+            return float(self.adjustment.parameters[0, -1])
+        return self.campaign.gravity
+
+    @property
+    def corrected(self) -> Array:
+        """Calibrated specific forces of the holds, (n, 3), m/s²."""
+        campaign = self.campaign
+        return self.model.correct(campaign.forces, self.parameters, self.gravity, campaign.hold)
+
+    @property
+    def norm_residuals(self) -> Array:
+        """|f_b| − g of the holds, (n,), m/s²."""
+        return np.linalg.norm(self.corrected, axis=1) - self.gravity
+
+    @property
+    def rms_norm_residual(self) -> float:
+        """Rms of |f_b| − g over the holds, m/s²."""
+        return float(np.sqrt(np.mean(self.norm_residuals**2)))
+
+    # --- How good it is
+
+    @cached_property
+    def tests(self) -> quality.PositionTests:
+        """Tests of the positions."""
+        return quality.position_tests(self.solution)
+
+    @cached_property
+    def reliability(self) -> quality.Reliability:
+        """Reliability of the positions."""
+        return quality.reliability(self.solution)
+
+    @cached_property
+    def suspects(self) -> dict[int, float]:
+        """Adjusted p-values of the positions in conflict with the others, removed one at a time."""
+        found = quality.suspects(
+            self.model,
+            self.approach,
+            self.observed,
+            alpha=OUTLIER_LEVEL,
+            sigma_known=self.trusts_sigma,
+        )
+        return {int(self.campaign.positions[one.position]): one.p_value for one in found}
+
+    @cached_property
+    def held_out(self) -> quality.HeldOut | None:
+        """Prediction of each position from the others; None where those do not determine it."""
+        return quality.held_out(self.solution)
+
+    @cached_property
+    def components(self) -> VarianceComponents | None:
+        """Variance components of accelerometer and robot; None without a robot."""
+        if not self.sigma_known:
+            return None
+        return variance_components(self.model, self.approach, self.observed)
+
+    @cached_property
+    def tilt(self) -> TiltLeft:
+        """The tilt error that is left over usual tilts."""
+        return self.tilt_left()
+
+    @cached_property
+    def implausible(self) -> tuple[str, ...]:
+        """Parameters and tilt errors that no sensor has."""
+        parameters = implausible_parameters(self.model.effects, self.parameters, self.sigma)
+        return *parameters, *implausible_tilt(*self.tilt.total)
+
+    @cached_property
+    def gross_error(self) -> Recognition | None:
+        """A gross error in the campaign; one of the angles shows even where they are not used."""
+        return recognise(self.campaign)
+
+    @property
+    def p_adjusted(self) -> Array:
+        """P-values of the positions, (n,), adjusted for their number.
+
+        That of a suspect is from the round in which it was found, without the worse ones before it.
+        """
+        p_values = self.tests.p_adjusted(self.trusts_sigma)
+        for position, p_value in self.suspects.items():
+            p_values[self.campaign.positions == position] = p_value
+        return p_values
+
+    @property
+    def warnings(self) -> list[str]:
+        """Signs of a gross error; empty for a plausible calibration."""
+        gross = self.gross_error
+        return [*self.implausible, *([] if gross is None else [gross.reason])]
+
+    @property
+    def state(self) -> str:
+        """State of the calibration: the first that applies of those below.
+
+        `IMPLAUSIBLE` if no sensor has such parameters or the data look grossly wrong, `REJECTED` if
+        the residuals refute the stated noise, `UNCHECKED` if nothing could have refuted it, else
+        `ACCEPTED`.
+        """
+        test = self.global_test
+        if self.implausible or self.gross_error is not None:
+            return IMPLAUSIBLE
+        if test is not None and not test.accepted:
+            return REJECTED
+        return UNCHECKED if test is None or test.powerless else ACCEPTED
+
+    def tilt_left(self, max_tilt: float = MAX_TILT_GON * GON) -> TiltLeft:
+        """Tilt error that a calibration leaves over tilts up to `max_tilt`, rad.
+
+        The excess of the residuals over the stated noise is what the model does not describe. An
+        effect of the sensor is in each reading that is leveled, as it was in the positions, and the
+        uncertainty of the parameters does not contain it.
+        """
+        model, g = self.model, self.gravity
+        f_b = cap_forces(max_tilt, ATTITUDES, g)
+        hold = holds_in_use(self.campaign.hold, self.campaign.n_positions, f_b)
+        p = np.where(model.stays, self.parameters, 0.0)
+        in_use = model, p, model.sense(f_b, p, g, hold), f_b, g, hold
+        slope, quoted = tilt_slope(*in_use) * model.stays, self.covariance
+
+        def rms(columns: slice = slice(None), covariance: Array = quoted) -> Array:
+            part, block = slope[..., columns], covariance[columns, columns]
+            return np.sqrt(np.einsum("kau,uw,kaw->a", part, block, part) / len(part))
+
+        shares = {effect.name: rms(own) for effect, own in model.parts if effect.part == "sensor"}
+        missing = np.zeros(2)
+        stated = self.campaign.sigma_force
+        if stated is not None and not self.trusts_sigma:
+            excess = self.sigma_position_posteriori**2 - stated**2
+            by_output = np.mean(np.sum(tilt_by_output(*in_use) ** 2, axis=-1), axis=0)
+            missing = np.sqrt(max(excess, 0.0) * by_output)
+        part = self.by_reference
+        reference = None if part is None else rms(covariance=part)
+        return TiltLeft(shares, rms(), reference, missing)
