@@ -114,7 +114,7 @@ class History(Result):
     @property
     def sensor(self) -> str | None:
         """What was calibrated; None if no campaign says it."""
-        return next((x for one in self.sessions if (x := one.content["sensor"])), None)
+        return next((x for one in self.sessions if (x := one.document.sensor)), None)
 
     @property
     def effects(self) -> list[str]:
@@ -125,7 +125,7 @@ class History(Result):
     def calibrations(self) -> list[Calibration]:
         """Campaigns with their dates, in the order of time."""
         each = zip_longest(self.sessions, (date.isoformat() for date in self.dates))
-        return [Calibration(campaign=one.content["campaign"], date=date) for one, date in each]
+        return [Calibration(campaign=one.document.campaign, date=date) for one, date in each]
 
     @property
     def years(self) -> Array:
@@ -338,7 +338,7 @@ def _check_alike(calibrations: Sequence[SensorCalibration]) -> None:
         own = [effect.spec for effect in one.model.effects]
         if not np.isfinite(one.covariance).all():
             why = "no sigmas; calibrate with more positions, or state the noise of the campaign"
-        elif one.content["nominal"] != calibrations[0].content["nominal"]:
+        elif one.document.nominal != calibrations[0].document.nominal:
             why = (
                 "nominal: other scales or offsets from counts to m/s^2 than in the first "
                 "calibration, so their parameters do not mean the same; import both logs with the "
@@ -351,7 +351,7 @@ def _check_alike(calibrations: Sequence[SensorCalibration]) -> None:
             )
         else:
             continue
-        raise InputError(f"calibration {number} ({one.content['campaign']}): {why}")
+        raise InputError(f"calibration {number} ({one.document.campaign}): {why}")
 
 
 def dates_of(
@@ -384,7 +384,7 @@ def dates_of(
         # Noise never repeats: the same numbers are one campaign, whatever the file is called.
         if (same := first.setdefault(one.parameters.tobytes(), name)) is not name:
             raise InputError(f"{name}: has the numbers of {same}; each counts once")
-        date = dates[i] if dates else one.content["date"]
+        date = dates[i] if dates else one.document.date
         if date is None and len(calibrations) < MIN_COURSE:
             return []
         if date is None:
