@@ -6,7 +6,6 @@ from collections import defaultdict
 from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import cached_property
-from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -40,6 +39,7 @@ from accelstudy.diagnosis.evidence.noise_tests import (
     tests_of_noise,
     worst_of,
 )
+from accelstudy.diagnosis.file_format import Estimate, Fit, Found, LikelyPlace, UpperLimit
 from accelstudy.diagnosis.held_out import Gap
 from accelstudy.diagnosis.next_positions import NextPosition, next_positions
 from accelstudy.diagnosis.rules import RULES
@@ -47,79 +47,13 @@ from accelstudy.diagnosis.shape import LearnedShape, shape_of
 from accelstudy.diagnosis.space.frame import SessionFit
 from accelstudy.diagnosis.space.hypotheses import OUTLIER
 from accelstudy.diagnosis.space.shapes import Place
-from accelstudy.diagnosis.visibility import UpperLimit, upper_limits
+from accelstudy.diagnosis.visibility import upper_limits
 from accelstudy.effects.learned import LEARNED
 from accelstudy.sensors.plausibility import implausible_parameters
 from accelstudy.sensors.sensor import SensorModel
 
 MISSING = ("named", "narrowed", "learned", "unknown")
 """Verdicts by which the model lacks something."""
-
-
-class Estimate(NamedTuple):
-    """Value of a parameter or setting with its sigma, SI."""
-
-    name: str
-    value: float
-    sigma: float | None
-    unit: str
-
-
-@dataclass(frozen=True)
-class NamedCause:
-    """An effect, noise effect or gross error that was found.
-
-    Attributes
-    ----------
-    name, spec : str; of a bumped position `spec` is the name
-    position : int, of a bumped position
-    equivalence_class : tuple of str, names that mean the same in this campaign
-    posterior : float; None of what is no rival of the others
-    parameters : tuple of Estimate; empty of what is no effect
-    settings : tuple of Estimate, of those that were searched for
-    imitators : tuple of str, further names that could leave the same, and more
-    """
-
-    name: str
-    spec: str
-    position: int | None
-    equivalence_class: tuple[str, ...]
-    posterior: float | None
-    parameters: tuple[Estimate, ...] = ()
-    settings: tuple[Estimate, ...] = ()
-    imitators: tuple[str, ...] = ()
-
-
-class FitSize(NamedTuple):
-    """Variance of unit weight of a fit, beside that of simulated sessions.
-
-    Attributes
-    ----------
-    model : str, "base" or "extended"
-    redundancy : int
-    simulated : (float, float), central 95 % of sessions in which the model of the fit is complete
-    measured : float, in units of the stated noise; where none is stated, of what the last fit
-        leaves
-    """
-
-    model: str
-    redundancy: int
-    simulated: tuple[float, float]
-    measured: float
-
-
-class LikeShape(NamedTuple):
-    """Possible place of what is missing: a target that is a function of a coordinate.
-
-    Attributes
-    ----------
-    coordinate, target : str
-    posterior : float, given that it is such a function, or one of the attitude alone
-    """
-
-    coordinate: str
-    target: str
-    posterior: float
 
 
 @dataclass(frozen=True)
@@ -216,16 +150,16 @@ class CampaignDiagnosis:
         return self.finding.statement.certain
 
     @cached_property
-    def found(self) -> tuple[NamedCause, ...]:
+    def found(self) -> tuple[Found, ...]:
         """All that was found; of the unknown, what is certain all the same."""
         gross = () if self.recognised is None else self.recognised.names
-        named = [NamedCause(name, name, at, (name,), None) for name, at in gross]
+        named = [Found.of_name(name, at=at) for name, at in gross]
         if self.finding.verdict == "noise_model":
             return (*named, self._noise())
         return (*named, *self._chosen_causes())
 
     @property
-    def effects(self) -> tuple[NamedCause, ...]:
+    def effects(self) -> tuple[Found, ...]:
         """What the verdict names; nothing if that is unknown."""
         return () if self.verdict == "unknown" else self.found
 
@@ -240,16 +174,16 @@ class CampaignDiagnosis:
         bumped = [named.position for named in self.found if named.position is not None]
         return ~np.isin(self.campaign.positions, bumped)
 
-    def _noise(self) -> NamedCause:
+    def _noise(self) -> Found:
         """What is wrong with the noise."""
         worst, posterior = worst_of(self.noise_tests), self.finding.posterior
         name = next(one.names[0] for one in posterior.reported if one.is_noise)
         # Of larger residuals the level says least; what they are, the evidence says.
         if worst is not None and not (worst.name == LEVEL and posterior.p_noise >= RULES.sure):
             name = worst.name
-        return NamedCause(name, name, None, (name,), posterior.p_noise)
+        return Found.of_name(name, posterior.p_noise)
 
-    def _chosen_causes(self) -> list[NamedCause]:
+    def _chosen_causes(self) -> list[Found]:
         """What was chosen, with its estimates."""
         solution, chosen = self.final.solution, self.finding.chosen
         cofactors = with_settings(self.frame, solution, [one.shape for one in chosen])
@@ -261,27 +195,27 @@ class CampaignDiagnosis:
 
     def _describe(
         self, cause: Cause, values: dict[str, tuple[float, float]], searched: Iterator[float]
-    ) -> NamedCause:
+    ) -> Found:
         """Describe a cause by the values of all parameters, and sigmas of the log settings."""
         best, members = cause.shape, cause.members
         if best.place is not None:
             at = int(self.campaign.positions[best.place])
-            return NamedCause(OUTLIER, OUTLIER, at, (OUTLIER,), cause.posterior)
+            return Found.of_name(OUTLIER, cause.posterior, at)
         effect = best.distinguishable
         # What is beside a large effect was found in what its refit leaves.
         (here,) = (None,) if best.name == LEARNED else self.frame.hypotheses((best.effect,))
         like = () if here is None else self.frame.imitators(here)
         smooth = [s for s in best.effect.takes if s.name == best.smooth]
         of_logs = zip(smooth, searched, strict=False)
-        return NamedCause(
-            best.name,
-            best.effect.spec,
-            None,
-            members,
-            cause.posterior,
-            tuple(Estimate(q.name, *values[q.name], q.unit) for q in effect.parameters),
-            tuple(Estimate(s.name, best.value, best.value * log, s.unit) for s, log in of_logs),
-            tuple(other for other in like if other not in members),
+        return Found(
+            name=best.name,
+            spec=best.effect.spec,
+            position=None,
+            equivalence_class=members,
+            posterior=cause.posterior,
+            parameters=[Estimate.of(q, *values[q.name]) for q in effect.parameters],
+            settings=[Estimate.of(s, best.value, best.value * log) for s, log in of_logs],
+            imitators=[other for other in like if other not in members],
         )
 
     @cached_property
@@ -334,7 +268,7 @@ class CampaignDiagnosis:
         return global_test(self.base.omega, self.base.redundancy, sigma_dof=self.base.sigma_dof)
 
     @property
-    def fits(self) -> list[FitSize]:
+    def fits(self) -> list[Fit]:
         """Variances of unit weight of the base fit and of the final one, if that is another one."""
         gap, fits = self.gap, [("base", self.base, self.gap.before)]
         if gap.after is not None:
@@ -343,8 +277,9 @@ class CampaignDiagnosis:
         sizes = []
         for model, fit, variance in fits:
             dof = min(fit.sigma_dof, 1e9)
-            low, high = special.fdtri(fit.redundancy, dof, [0.025, 0.975]).tolist()
-            sizes.append(FitSize(model, fit.redundancy, (low, high), variance / unit))
+            r, measured = fit.redundancy, variance / unit
+            usual = special.fdtri(r, dof, [0.025, 0.975]).tolist()
+            sizes.append(Fit(model=model, redundancy=r, simulated=usual, measured=measured))
         return sizes
 
     # --- what follows -------------------------------------------------------------------------
@@ -356,7 +291,7 @@ class CampaignDiagnosis:
         return shape_of(self.finding, self.noise.variance) if learned else None
 
     @cached_property
-    def like(self) -> tuple[LikeShape, ...]:
+    def like(self) -> tuple[LikelyPlace, ...]:
         """Possible places of what is missing, most probable first; empty if nothing is missing.
 
         The places are those of all that is missing or, where the most probable explanation with
@@ -367,7 +302,10 @@ class CampaignDiagnosis:
             return ()
         explanations = finding.credible_set if finding.verdict in ("unknown", LEARNED) else ()
         names = next((one.names for one in explanations if UNKNOWN in one.names), (UNKNOWN,))
-        like = [LikeShape(*at, p) for at, p in shares_of_places(self.problem, names).items()]
+        like = [
+            LikelyPlace(coordinate=coordinate, target=target, posterior=p)
+            for (coordinate, target), p in shares_of_places(self.problem, names).items()
+        ]
         return tuple(sorted(like, key=lambda one: -one.posterior))
 
     @cached_property

@@ -16,6 +16,7 @@ from accelstudy.basics.units import display_unit
 from accelstudy.basics.wording import amount
 from accelstudy.campaign.calibration.fit import fit_campaign
 from accelstudy.campaign.session import Campaign
+from accelstudy.diagnosis.file_format import UpperLimit
 from accelstudy.diagnosis.rules import RULES
 from accelstudy.diagnosis.space.frame import SessionFit
 from accelstudy.diagnosis.space.hypotheses import OUTLIER, Hypothesis, cosines
@@ -26,15 +27,6 @@ from accelstudy.simulation.hold_plan import check_needs_no_plan
 from accelstudy.simulation.sessions import Noise, session
 
 Array = NDArray[np.float64]
-
-
-class UpperLimit(NamedTuple):
-    """Largest value of a parameter that the campaign does not exclude at 95 %, SI."""
-
-    name: str
-    parameter: str
-    value: float
-    unit: str
 
 
 class Visibility(NamedTuple):
@@ -101,7 +93,8 @@ def upper_limits(frame: SessionFit, known: bool, named: Sequence[str]) -> list[U
         bounds = np.abs(values) + needed * np.sqrt(variance * np.sum(inverse**2, axis=1))
         worst = int(np.argmax(bounds))
         parameter = best.effect.parameters[worst]
-        limits.append(UpperLimit(name, parameter.name, float(bounds[worst]), parameter.unit))
+        limit, unit = float(bounds[worst]), parameter.unit
+        limits.append(UpperLimit(name=name, parameter=parameter.name, value=limit, unit=unit))
     return limits
 
 

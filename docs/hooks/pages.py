@@ -13,7 +13,7 @@ import schemas
 from mkdocs.structure.files import File
 
 from accelstudy.campaign.calibration.file_format import CalibrationDocument
-from accelstudy.diagnosis.report.file_format import DiagnosisDocument
+from accelstudy.diagnosis.file_format import DiagnosisDocument
 from accelstudy.epochs.file_format import HistoryDocument
 from accelstudy.lots.file_format import LotDocument
 from accelstudy.planning.plan import PlanDocument

@@ -72,8 +72,8 @@ def test_a_large_effect_is_named_confirmed_and_placed_where_its_formula_has_it(e
     assert found.gap.after < 2 < found.gap.before
     if named.name == spec:  # estimates are only comparable in the same shape
         true = {p["name"]: p["value"] for p in truth["effects"][0]["parameters"]}
-        for name, value, sigma, _ in named.parameters:
-            assert abs(value - true[name]) < 5 * sigma
+        for one in named.parameters:
+            assert abs(one.value - true[one.name]) < 5 * one.sigma
     if place is not None:
         assert (found.like[0].coordinate, found.like[0].target) == place
         posteriors = [each.posterior for each in found.like]

@@ -17,8 +17,8 @@ import accelstudy as acs
 from accelstudy.basics.errors import InputError
 from accelstudy.basics.units import MGON
 from accelstudy.campaign.format import write_campaign
+from accelstudy.diagnosis.file_format import DiagnosisDocument
 from accelstudy.diagnosis.pipeline import diagnose
-from accelstudy.diagnosis.report.file_format import DiagnosisDocument
 from accelstudy.diagnosis.report.output import Diagnosis
 from accelstudy.diagnosis.report.words import verdict_lines
 from accelstudy.diagnosis.visibility import examine_campaign

@@ -28,9 +28,9 @@ from accelstudy.diagnosis.consequences import TiltErrors
 from accelstudy.diagnosis.decision.posterior import Posterior
 from accelstudy.diagnosis.decision.statement import statement_of
 from accelstudy.diagnosis.decision.verdict import Finding, Reason
+from accelstudy.diagnosis.file_format import DiagnosisDocument
 from accelstudy.diagnosis.held_out import Gap
 from accelstudy.diagnosis.pipeline import decide, diagnose
-from accelstudy.diagnosis.report.file_format import DiagnosisDocument
 from accelstudy.diagnosis.report.output import Diagnosis
 from accelstudy.diagnosis.report.words import render, verdict_lines
 from accelstudy.diagnosis.result import CampaignDiagnosis
@@ -199,7 +199,7 @@ def test_what_is_certain_of_the_unknown_is_told_and_in_the_model(named, tmp_path
     assert part["names"] == ["thermal_bias"]
     assert part["spec"] == found.spec
     assert [(q["name"], q["value"]) for q in part["parameters"]] == [
-        (name, value) for name, value, *_ in found.parameters
+        (q.name, q.value) for q in found.parameters
     ]
     assert content["effects"] == []
     assert "The model lacks thermal bias; what is missing beside it has no name here." in text

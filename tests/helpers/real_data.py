@@ -127,7 +127,7 @@ def nonlinearity():
     for name, one in (("before", base), ("after", left["quadratic terms"])):
         said[f"rms {name}"] = number(1e3 * float(np.sqrt(one / n)))
     d = diagnosed("ck-explorer")
-    (y,) = (value for name, value, *_ in d.found[0].parameters if name == "k2_y")
+    (y,) = (one.value for one in d.found[0].parameters if one.name == "k2_y")
     said["reading of y less"] = number(-1e3 * y * g)
     posteriors = {one.names: one.posterior for one in d.credible_set}
     said["posterior of the asymmetry"] = number(posteriors["scale_asymmetry",])

@@ -20,7 +20,7 @@ from accelstudy.campaign.calibration.document import calibration_document
 from accelstudy.campaign.calibration.fit import campaign_estimability
 from accelstudy.diagnosis.consequences import TiltErrors
 from accelstudy.diagnosis.decision.statement import Part
-from accelstudy.diagnosis.report.file_format import DiagnosisDocument
+from accelstudy.diagnosis.file_format import DiagnosisDocument
 from accelstudy.diagnosis.report.words import clauses, warnings
 from accelstudy.diagnosis.result import CampaignDiagnosis
 from accelstudy.diagnosis.rules import RULES

@@ -18,9 +18,9 @@ from accelstudy.basics.progress import say, show, stage, warn
 from accelstudy.campaign.calibration.file_format import CalibrationDocument
 from accelstudy.campaign.calibration.result import Calibration
 from accelstudy.campaign.calibration.sensor_calibration import unknown
+from accelstudy.diagnosis.file_format import DiagnosisDocument
 from accelstudy.diagnosis.report import document, words
 from accelstudy.diagnosis.report.figures import diagnosis_figures, draw_explanations
-from accelstudy.diagnosis.report.file_format import DiagnosisDocument
 from accelstudy.diagnosis.result import MISSING, CampaignDiagnosis
 from accelstudy.diagnosis.rules import RULES
 from accelstudy.drawing.saving import save_all

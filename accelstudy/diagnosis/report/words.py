@@ -19,7 +19,8 @@ from accelstudy.diagnosis.decision.statement import (
     statement_of,
 )
 from accelstudy.diagnosis.decision.verdict import Reason
-from accelstudy.diagnosis.result import CampaignDiagnosis, NamedCause
+from accelstudy.diagnosis.file_format import Found
+from accelstudy.diagnosis.result import CampaignDiagnosis
 from accelstudy.diagnosis.rules import RULES
 from accelstudy.diagnosis.shape import TARGETS, LearnedShape, coordinate_of
 from accelstudy.effects import Effect, get_effect
@@ -100,7 +101,7 @@ def may_be_an_effect(diagnosis: CampaignDiagnosis) -> bool:
     return diagnosis.verdict == "noise_model" and noise_only(diagnosis) < RULES.sure
 
 
-def name_text(named: NamedCause) -> str:
+def name_text(named: Found) -> str:
     """Name what was found; a learned function by its coordinate."""
     if named.name != LEARNED:
         return words(named.name)
@@ -109,12 +110,12 @@ def name_text(named: NamedCause) -> str:
     return f"the function of {coordinate_of(effect.coordinate).words}"
 
 
-def effect_of(named: NamedCause) -> Effect:
+def effect_of(named: Found) -> Effect:
     """Effect that was found."""
     return get_effect(named.spec)
 
 
-def title(named: NamedCause, titled: set[str] | None = None) -> str:
+def title(named: Found, titled: set[str] | None = None) -> str:
     """Name what was found, with all that would be the same and has no title, or its position."""
     if named.position is not None:
         return f"{words(named.name)} {named.position}"

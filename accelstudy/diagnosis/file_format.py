@@ -6,7 +6,9 @@ from typing import Annotated, Literal, Self
 
 from pydantic import Field, model_validator
 
+from accelstudy.basics.registry import Setting
 from accelstudy.campaign.calibration.file_format import Correction, Suspect
+from accelstudy.effects import Parameter
 from accelstudy.effects.learned import LEARNED
 from accelstudy.files.documents import Document, Part
 
@@ -129,6 +131,11 @@ class Estimate(Part):
     sigma: float | None
     unit: str
 
+    @classmethod
+    def of(cls, quantity: Parameter | Setting, value: float, sigma: float) -> Self:
+        """Estimate of a parameter or a setting."""
+        return cls(name=quantity.name, value=value, sigma=sigma, unit=quantity.unit)
+
 
 class Certain(Part):
     """What is missing whatever else is open.
@@ -175,6 +182,14 @@ class Found(Part):
     settings: list[Estimate]
     imitators: list[str]
 
+    @classmethod
+    def of_name(cls, name: str, posterior: float | None = None, at: int | None = None) -> Self:
+        """Describe what is no effect: noise, or a gross error, perhaps at a position."""
+        return cls(
+            name=name, spec=name, position=at, equivalence_class=[name], posterior=posterior,
+            parameters=[], settings=[], imitators=[],
+        )  # fmt: skip
+
 
 class Function(Part):
     """A function in SI.
@@ -211,7 +226,7 @@ class Shape(Part):
     function: Function
 
 
-class Place(Part):
+class LikelyPlace(Part):
     """A possible place of what is missing: a function of a coordinate.
 
     Attributes
@@ -223,7 +238,7 @@ class Place(Part):
 
     coordinate: str
     target: str
-    posterior: Probability | None
+    posterior: Probability
 
 
 class Change(Part):
@@ -403,7 +418,7 @@ class DiagnosisDocument(Document):
     effects: list[Found]
     suspects: list[Suspect]
     shape: Shape | None
-    like: list[Place]
+    like: list[LikelyPlace]
     gap: Gap
     invisible_effects: list[str]
     untestable_effects: dict[str, str]
