@@ -13,7 +13,7 @@ from accelstudy.basics.errors import InputError, UnknownNameError
 from accelstudy.basics.units import GON, attitude_unit, to_attitude
 from accelstudy.leveling.angles import angles_of, specific_force
 from accelstudy.positions.points import corners, edges, evenly_spread, faces
-from accelstudy.schemes import UnknownSchemeError, get_scheme
+from accelstudy.schemes import get_scheme
 
 Array = NDArray[np.float64]
 
@@ -124,7 +124,7 @@ def find_attitudes(name: str, names: Collection[str]) -> Attitudes:
         return NAMED[name]()
     try:
         scheme = get_scheme(name)
-    except UnknownSchemeError:
+    except UnknownNameError:
         raise UnknownNameError("set of attitudes", name, (*names, "a scheme")) from None
     points = np.unique(scheme.directions.round(12), axis=0)
     return Attitudes(f"{len(points)} attitudes of {scheme.name}", _unit(points))

@@ -53,12 +53,6 @@ def per_axis(name: str, unit: str, symbol: str) -> tuple[Parameter, ...]:
     return tuple(Parameter(f"{name}_{i}", unit, f"${symbol.replace('%', i)}$") for i in AXES)
 
 
-def after(when: Number, moment: Number, xp: Any) -> Number:
-    """Step function of time: 1 after a moment, 0 before it."""
-    sign = xp.sign(when - moment)
-    return (sign + xp.abs(sign)) / 2
-
-
 class Effect(WithSettings):
     """One systematic effect; subclasses set the class attributes and override what they add.
 

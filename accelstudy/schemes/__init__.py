@@ -7,7 +7,6 @@ from accelstudy.basics.registry import import_modules
 from accelstudy.positions.scheme import Scheme, Status
 from accelstudy.schemes.files import is_scheme_file
 from accelstudy.schemes.registry import (
-    UnknownSchemeError,
     get_scheme,
     register,
     scheme_families,
@@ -17,7 +16,6 @@ from accelstudy.schemes.registry import (
 __all__ = [
     "Scheme",
     "Status",
-    "UnknownSchemeError",
     "get_scheme",
     "is_scheme_file",
     "register",

@@ -9,19 +9,40 @@ from __future__ import annotations
 import hashlib
 import os
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any
 
-import numpy as np
+from pydantic import AfterValidator, Field
 
-from accelstudy.basics.errors import InputError, UnknownNameError
-from accelstudy.basics.names import check_path_name, path_name
+from accelstudy.basics.bounds import Range
+from accelstudy.basics.names import path_name
 from accelstudy.files.reading import read_layer
-from accelstudy.positions.scheme import Scheme
+from accelstudy.files.validation import ConfigSection, PathName, bounds_of, validate
+from accelstudy.positions.scheme import Scheme, unit_vectors
 
-KEYS = ("scheme", "title", "source", "directions", "positions", "design")
-"""Keys of a file. Only `directions` is required; the last two are for people and not read."""
+Component = Annotated[float, *bounds_of(Range(-1e100, 1e100))]  # whose square is finite
+
+
+def _not_zero(direction: list[float]) -> list[float]:
+    if not any(direction):
+        raise ValueError("must not be zero")
+    return direction
+
+
+Direction = Annotated[list[Component], Field(min_length=3, max_length=3), AfterValidator(_not_zero)]
+
+
+class SchemeFile(ConfigSection):
+    """The content of a file: directions of gravity in the body frame, of any length."""
+
+    directions: Annotated[list[Direction], Field(min_length=1)]
+    scheme: PathName | None = None
+    title: str | None = None
+    source: str | None = None
+    positions: Any = Field(None, description="attitudes, for people; not read")
+    design: Any = Field(None, description="how it was designed, for people; not read")
+
 
 _read: dict[str, Scheme] = {}
 
@@ -39,11 +60,7 @@ def scheme_of_file(path: str | Path) -> Scheme:
     InputError
         One line that names the file, the key, what is wrong and what would be right.
     """
-    content = read_layer(path)
-    try:
-        scheme = parse_scheme(content, Path(path).stem)
-    except InputError as error:
-        raise InputError(f"{path}: {error}") from None
+    scheme = parse_scheme(read_layer(path), Path(path).stem, path)
     return _read.setdefault(scheme.name, scheme)
 
 
@@ -52,50 +69,22 @@ def known_scheme(name: str) -> Scheme | None:
     return _read.get(name)
 
 
-def parse_scheme(content: Mapping[str, Any], name: str) -> Scheme:
+def parse_scheme(content: Mapping[str, Any], name: str, source: str | Path = "scheme") -> Scheme:
     """Make a scheme of the content of a file.
 
     Parameters
     ----------
     content : mapping
     name : str, of the scheme if the content gives none
+    source : str or path, named in errors
     """
-    for key in content:
-        if key not in KEYS:
-            raise UnknownNameError("key", key, KEYS)
-    texts = {
-        "scheme": path_name(name, "scheme"),
-        "title": "of a file",
-        "source": "",
-        **{key: content[key] for key in KEYS[:3] if content.get(key) is not None},
-    }
-    for key, text in texts.items():
-        if not isinstance(text, str):
-            raise InputError(f"{key}: must be a text")
-    try:
-        check_path_name(texts["scheme"])
-    except InputError as error:
-        raise InputError(f"scheme: {error}") from None
-    directions = _directions(content.get("directions"))
-    unnamed = Scheme("", "", directions, "generated", "")
-    digest = hashlib.sha256(unnamed.directions.tobytes()).hexdigest()[:8]
+    file = validate(SchemeFile, content, source)
+    directions = unit_vectors(file.directions)
+    digest = hashlib.sha256(directions.tobytes()).hexdigest()[:8]
     return Scheme(
-        name=f"{texts['scheme']}@{digest}",
-        title=f"{len(directions)} {texts['title']}",
-        directions=unnamed.directions,
+        name=f"{file.scheme or path_name(name, 'scheme')}@{digest}",
+        title=f"{len(directions)} {file.title or 'of a file'}",
+        directions=directions,
         status="generated",
-        source=texts["source"],
+        source=file.source or "",
     )
-
-
-def _directions(entry: Any) -> np.ndarray[Any, np.dtype[np.float64]]:
-    wrong = "directions: must be a list of rows of three numbers, gravity in the body frame"
-    if not isinstance(entry, Sequence) or isinstance(entry, str) or not entry:
-        raise InputError(wrong)
-    for number, row in enumerate(entry, start=1):
-        numbers = isinstance(row, Sequence) and all(
-            isinstance(x, int | float) and not isinstance(x, bool) and abs(x) < 1e100 for x in row
-        )
-        if not numbers or len(row) != 3 or not np.linalg.norm(row) > 0:
-            raise InputError(f"{wrong}; row {number} is not")
-    return np.asarray(entry, dtype=float)

@@ -3,7 +3,6 @@
 A module of this package holds one idea: a function that returns directions, and its registration.
 """
 
-import difflib
 import re
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -13,7 +12,7 @@ from typing import TypeVar
 import numpy as np
 from numpy.typing import ArrayLike
 
-from accelstudy.basics.errors import InputError
+from accelstudy.basics.errors import UnknownNameError
 from accelstudy.basics.plugins import HOW
 from accelstudy.basics.registry import Registry
 from accelstudy.positions.scheme import Scheme, Status
@@ -21,10 +20,6 @@ from accelstudy.schemes.files import is_scheme_file, known_scheme, scheme_of_fil
 
 Builder = Callable[..., ArrayLike]
 AnyBuilder = TypeVar("AnyBuilder", bound=Builder)
-
-
-class UnknownSchemeError(InputError):
-    """A name that no scheme has."""
 
 
 @dataclass(frozen=True)
@@ -109,7 +104,7 @@ def get_scheme(name: str) -> Scheme:
 
     Raises
     ------
-    UnknownSchemeError
+    UnknownNameError
         If there is no such scheme. The message lists what there is.
     InputError
         If a file cannot be read, or holds no scheme.
@@ -125,7 +120,8 @@ def _registered(name: str) -> Scheme:
     for entry in sorted(_entries(), key=lambda entry: _is_family(entry.template)):
         if scheme := entry.scheme(name):
             return scheme
-    raise UnknownSchemeError(_unknown(name))
+    families = f"; families, N from 1 to 9999: {', '.join(scheme_families())}"
+    raise UnknownNameError("scheme", name, scheme_names(), families + HOW)
 
 
 def scheme_names() -> tuple[str, ...]:
@@ -152,13 +148,3 @@ def _is_family(template: str) -> bool:
 
 def _pattern(template: str) -> str:
     return "-".join(_NUMBERS.get(word, re.escape(word)) for word in template.split("-"))
-
-
-def _unknown(name: str) -> str:
-    names, families = scheme_names(), scheme_families()
-    close = difflib.get_close_matches(name.lower(), names, n=1)
-    hint = f" Did you mean {close[0]!r}?" if close else ""
-    return (
-        f"unknown scheme {name!r}.{hint} Schemes: {', '.join(names)}; "
-        f"families: {', '.join(families)} (N from 1 to 9999){HOW}"
-    )

@@ -133,11 +133,11 @@ def test_a_job_needs_no_file(tmp_path, monkeypatch):
 
 @pytest.mark.parametrize(
     ("text", "wrong"),
-    {"": "not a mapping", "scheme: a\n": "directions: must be a list of rows",
-     "directions: [[1, 2]]\n": "row 1 is not",
-     "directions: [[0, 0, 1], [0, 0, 0]]\n": "row 2 is not",
-     f"directions: [[0, 0, {10**400}]]\n": "row 1 is not",
-     "direction: [[0, 0, 1]]\n": "unknown key 'direction'; did you mean 'directions'",
+    {"": "not a mapping", "scheme: a\n": "directions: must be given",
+     "directions: [[1, 2]]\n": r"directions\.0: must have at least 3 entries",
+     "directions: [[0, 0, 1], [0, 0, 0]]\n": r"directions\.1: must not be zero",
+     f"directions: [[0, 0, {10**400}]]\n": r"directions\.0\.2: must be",
+     "direction: [[0, 0, 1]]\n": "direction: unknown key; did you mean 'directions'",
      "scheme: a/b\ndirections: [[0, 0, 1]]\n": "scheme: 'a/b' cannot be",
      "scheme: 3\ndirections: [[0, 0, 1]]\n": "scheme: must be a text"}.items(),
 )  # fmt: skip
