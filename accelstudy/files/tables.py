@@ -99,7 +99,8 @@ def table_writer(
 
     `measured` names columns of floats that hardly repeat. They are packed byte by byte, which is
     smaller and faster than a search for repetitions. Of numbers that count up the steps are stored,
-    and other floats stay as they are.
+    and other floats stay as they are. Readers may select by all columns but floats, which have no
+    smallest and largest number in each row group.
     """
     counting = [f.name for f in schema if pa.types.is_int64(f.type)]
     floats = [f.name for f in schema if pa.types.is_floating(f.type)]
@@ -115,6 +116,7 @@ def table_writer(
             compression="lz4",
             use_dictionary=[name for name in schema.names if name not in (*counting, *floats)],
             column_encoding=dict.fromkeys(counting, "DELTA_BINARY_PACKED"),
+            write_statistics=[name for name in schema.names if name not in floats],
             use_byte_stream_split=list(measured),
         ) as writer,
     ):

@@ -19,7 +19,6 @@ that only one of the two has below its quantile, which is told by how far they a
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
@@ -43,8 +42,9 @@ MEAN_OF_NORMAL = float(np.sqrt(2 / np.pi))
 """Mean absolute value of a standard normal variable."""
 MIN_DIFFERENCES = 10
 """Differences from which an sd is taken."""
-DIFFERENCE_REPLICATES = 100_000
-"""Replicates, the first ones, whose differences tell how far the two are apart."""
+DIFFERENCE_REPLICATES = 50_000
+"""Replicates, the first ones, whose differences tell how far the two are apart, and whose
+quantiles how dense they are."""
 
 
 @dataclass(frozen=True)
@@ -80,45 +80,49 @@ UNKNOWN = Estimates(*np.full(4, np.nan))
 
 # --- statistics of numbers (k, R) of R replicates -------------------------------------------------
 
-Statistic = Callable[[Array], tuple[Array, Array]]
-"""Function of numbers (k, R) of replicates: the statistics (m,), and the influences (m, r) on them
-of the first r replicates, at most `MAX_INFLUENCES`."""
+Value = tuple[Array, Array]
+"""Statistics (m,) of replicates, and the influences (m, r) on them of the first r replicates, at
+most `MAX_INFLUENCES`."""
 
 
-def mean(x: Array) -> tuple[Array, Array]:
+def mean(x: Array) -> Value:
     """Mean of each number."""
     value = x.mean(axis=1)
     return value, x[:, :MAX_INFLUENCES] - value[:, None]
 
 
-def sd(x: Array) -> tuple[Array, Array]:
-    """Standard deviation of each number."""
+@np.errstate(divide="ignore", invalid="ignore")
+def sd(x: Array) -> Value:
+    """Standard deviation of each number; NaN of a single replicate."""
     value, first = _sd(x), x[:, :MAX_INFLUENCES]
     z = (first - first.mean(axis=1, keepdims=True)) / value[:, None]
     return value, value[:, None] / 2 * (z**2 - 1)
 
 
-def root_mean(x: Array) -> tuple[Array, Array]:
-    """Root of the mean of each number, which is a square."""
-    square, influence = mean(x)
+def rms(x: Array) -> Value:
+    """Root of the mean square of each number."""
+    square, influence = mean(x**2)
     value = np.sqrt(square)
     return value, influence / (2 * value[:, None])
 
 
-def ratio(x: Array) -> tuple[Array, Array]:
-    """Mean of each number of the first half over the sd of its twin in the second half."""
-    (above, of_above), (below, of_below) = mean(x[: len(x) // 2]), sd(x[len(x) // 2 :])
-    value = above / below
-    relative = of_above / above[:, None] - of_below / below[:, None]
+@np.errstate(divide="ignore", invalid="ignore")
+def ratio(above: Value, below: Value) -> Value:
+    """Ratio of statistics of the same replicates."""
+    (above_value, of_above), (below_value, of_below) = above, below
+    value = above_value / below_value
+    relative = of_above / above_value[:, None] - of_below / below_value[:, None]
     return value, value[:, None] * relative
 
 
-def correlation(x: Array) -> tuple[Array, Array]:
+@np.errstate(divide="ignore", invalid="ignore")
+def correlation(x: Array) -> Value:
     """Correlations below the diagonal, in the order of `numpy.tril_indices`."""
     i, j = np.tril_indices(len(x), -1)
-    value = np.atleast_2d(np.corrcoef(x))[i, j]
-    centre, scale = np.array([(row.mean(), row.std()) for row in x]).T[:, :, None]
-    first = (x[:, :MAX_INFLUENCES] - centre) / scale
+    covariance = np.atleast_2d(np.cov(x, ddof=0))
+    scale = np.sqrt(np.diagonal(covariance))
+    value = covariance[i, j] / (scale[i] * scale[j])
+    first = (x[:, :MAX_INFLUENCES] - x.mean(axis=1, keepdims=True)) / scale[:, None]
     squares = first[i] ** 2 + first[j] ** 2
     return value, first[i] * first[j] - value[:, None] / 2 * squares
 
@@ -130,21 +134,16 @@ def _sd(x: Array) -> Array:
 
 
 def controlled(
-    statistic: Statistic,
-    own: Array,
-    theory: Array | None,
-    known: Array | float,
-    converged: NDArray[np.bool_],
+    converged: NDArray[np.bool_], known: Array | float, own: Value, theory: Value | None = None
 ) -> Estimates:
-    """Estimate a statistic of replicates, corrected by that of linear theory of the same noise.
+    """Estimate statistics of replicates, corrected by those of linear theory of the same noise.
 
     Parameters
     ----------
-    statistic : Statistic
-    own : (k, c) array, numbers of the calibrations that converged
-    theory : (k, R) array, the same of linear theory of all replicates; None without any
-    known : (m,) array, the statistics by linear theory; NaN where it does not know them
     converged : (R,) bool array, of which c are true
+    known : (m,) array, what linear theory knows the statistics to be; NaN what it does not know
+    own : Value, of the calibrations that converged
+    theory : Value, of linear theory of all replicates; None without any
 
     Returns
     -------
@@ -152,13 +151,13 @@ def controlled(
     """
     n, some = len(converged), converged[:MAX_INFLUENCES]
     with np.errstate(divide="ignore", invalid="ignore"):
-        plain, influence = statistic(own)
+        plain, influence = own
         x = np.zeros((len(plain), len(some)))
         x[:, some] = influence[:, : some.sum()] / some.mean()
         alone = _sd(x) / np.sqrt(n)
         if theory is None or n < MIN_REPLICATES:
             return Estimates(plain, alone, np.ones_like(plain), plain)
-        expected, y = statistic(theory)
+        expected, y = theory
         x, y = (each - each.mean(axis=1, keepdims=True) for each in (x, y))
         spread = (y * y).sum(axis=1)
         used = np.isfinite(np.broadcast_to(known, spread.shape)) & (spread > 0)
@@ -182,73 +181,82 @@ def usual_levels(count: int) -> Array:
 
 def controlled_quantiles(
     levels: Array,
-    own: Array,
-    theory: Array | None,
-    known: Array,
     converged: NDArray[np.bool_],
-    known_error: ArrayLike = 0.0,
+    known: ArrayLike,
+    known_error: ArrayLike,
+    own: Array,
+    theory: Array | None = None,
 ) -> Estimates:
-    """Estimate quantiles of a number of each replicate.
+    """Estimate quantiles of numbers of replicates.
 
     Parameters
     ----------
     levels : (k,) array, probabilities
-    own : (c,) array, the number in the calibrations that converged
-    theory : (R,) array, the number in linear theory of all R replicates; None without any
-    known : (k,) array, its quantiles; NaN where they are not known
     converged : (R,) bool array, of which c are true
-    known_error : (k,) array, relative errors of `known`
+    known : (m, k) array, the quantiles by linear theory; NaN where it does not know them
+    known_error : (m, k) array, relative errors of `known`
+    own : (m, c) array, numbers of the calibrations that converged
+    theory : (m, R) array, the same of linear theory of all replicates; None without any
 
     Returns
     -------
-    Estimates, (k,)
+    Estimates, (m, k)
     """
-    p, count = levels, len(own)
+    p, count, some = levels, own.shape[1], slice(DIFFERENCE_REPLICATES)
     wide = np.minimum(p, 1 - p) / 2
-    plain, low, high = _quantiles(own, p, wide)
-    slope = (high - low) / (2 * wide)
+    plain, slope = _quantiles(own, p), _slopes(own[:, some], p, wide)
     # Too few values have no density: their error is unknown.
-    variance = p * (1 - p) / count * (slope**2 if count >= MIN_REPLICATES else np.nan)
-    if count < MIN_REPLICATES or theory is None or not np.isfinite(known).all():
-        return Estimates(plain, np.sqrt(variance), np.ones(len(p)), plain)
-    failed = len(theory) - count
-    paired = theory[converged]
-    linear, low, high = _quantiles(theory, p, wide)
-    some = slice(DIFFERENCE_REPLICATES)
-    sd = _sd_near(own[some] - paired[some], paired[some], p, wide)
+    variance = p * (1 - p) / count * np.where(count >= MIN_REPLICATES, slope**2, np.nan)
+    if count < MIN_REPLICATES or theory is None:
+        return Estimates(plain, np.sqrt(variance), np.ones_like(plain), plain)
+    failed, linear = len(converged) - count, _quantiles(theory, p)
+    paired = theory[:, converged][:, some] if failed else theory[:, some]
+    sd = _sd_near(own[:, some] - paired, paired, p, wide)
     with np.errstate(divide="ignore", invalid="ignore"):
         # Share of the replicates that only one of the two has below its quantile.
-        apart = MEAN_OF_NORMAL * sd / slope + failed / len(theory)
+        apart = MEAN_OF_NORMAL * sd / slope + failed / len(converged)
         agreement = np.nan_to_num(np.clip(1 - apart / (2 * p * (1 - p)), 0.0, 1.0))
-        scale = np.where(agreement > 0, slope * 2 * wide / (high - low), 0.0)
-        corrected = plain - agreement * scale * (linear - known)
+        scale = np.where(agreement > 0, slope / _slopes(theory[:, some], p, wide), 0.0)
+        corrected = plain - agreement * scale * (linear - np.asarray(known))
         left = variance * (1 - agreement**2)
         if not failed:  # no more than the difference of one replicate
             left = np.minimum(left, sd**2)
-        left = left + (np.asarray(known_error) * known * agreement * scale) ** 2
+        left = left + (np.multiply(known_error, known) * agreement * scale) ** 2
         better = left < variance
         left = np.where(better, left, variance)
         value = np.where(better, corrected, plain)
-        return Estimates(value, np.sqrt(left), variance / left, plain)
+        return Estimates(value, np.sqrt(left), np.where(better, variance / left, 1.0), plain)
 
 
-def _quantiles(x: Array, p: Array, wide: Array) -> Array:
-    """Quantiles at p, p − wide and p + wide, (3, k), as of `numpy.quantile`, which is slower."""
-    place = (len(x) - 1) * np.array([p, p - wide, p + wide])
-    below = place.astype(int)
-    above = np.minimum(below + 1, len(x) - 1)
-    ordered = np.partition(x, np.union1d(below, above))
-    return np.asarray(ordered[below] + (place - below) * (ordered[above] - ordered[below]))
+def _quantiles(x: Array, p: Array) -> Array:
+    """Quantiles (m, k) of numbers (m, n), as of the slower `numpy.quantile`."""
+    place = (x.shape[1] - 1) * p
+    below = place.astype(np.intp)
+    ends, at = np.unique([below, np.minimum(below + 1, x.shape[1] - 1)], return_inverse=True)
+    # Row by row, as copies of all rows of a million replicates would take much memory.
+    low, high = np.array([np.partition(row, ends)[ends][at] for row in x]).swapaxes(0, 1)
+    return np.asarray(low + (place - below) * (high - low))
+
+
+def _slopes(x: Array, p: Array, wide: Array) -> Array:
+    """Derivatives (m, k) of the quantiles of numbers (m, n)."""
+    low, high = np.split(_quantiles(x, np.concatenate([p - wide, p + wide])), 2, axis=1)
+    return (high - low) / (2 * wide)
 
 
 def _sd_near(differences: Array, theory: Array, p: Array, wide: Array) -> Array:
-    """Sd of the differences from linear theory near its quantiles, (k,)."""
-    n = len(theory)
-    ordered = (differences - differences.mean())[np.argsort(theory)]
-    sums = np.vstack([np.zeros(2), np.cumsum([ordered, ordered**2], axis=1).T])
+    """Sd of the differences (m, n) from linear theory near its quantiles, (m, k)."""
+    n = theory.shape[1]
+    centred = differences - differences.mean(axis=1, keepdims=True)
+    ordered = np.take_along_axis(centred, np.argsort(theory), axis=1)
     half = np.maximum(wide * n, MIN_DIFFERENCES / 2)
     first = np.clip(np.floor(p * n - half), 0, n - MIN_DIFFERENCES).astype(int)
     last = np.clip(np.ceil(p * n + half), first + MIN_DIFFERENCES, n).astype(int)
-    total, square = (sums[last] - sums[first]).T
     count = last - first
-    return np.sqrt(np.maximum(square - total**2 / count, 0.0) / (count - 1))
+
+    def total(numbers: Array) -> Array:
+        sums = np.pad(np.cumsum(numbers, axis=1), ((0, 0), (1, 0)))
+        return np.asarray(sums[:, last] - sums[:, first])
+
+    squares = total(ordered**2) - total(ordered) ** 2 / count
+    return np.sqrt(np.maximum(squares, 0.0) / (count - 1))

@@ -66,7 +66,7 @@ class KnownValues:
 
     @property
     def statistics(self) -> dict[str, Array | float]:
-        """Statistics by their names in `accelstudy.study.statistics.STATISTICS`."""
+        """Statistics by their names in `accelstudy.study.statistics`."""
         theory, determined = self.theory, self._determines_factor
         correlation = theory.covariance / np.outer(self.sd, self.sd)
         # The interval has its nominal share where the truth is in its middle.

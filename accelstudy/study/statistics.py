@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,13 +16,13 @@ from accelstudy.study.estimate import (
     MIN_REPLICATES,
     UNKNOWN,
     Estimates,
-    Statistic,
+    Value,
     controlled,
     controlled_quantiles,
     correlation,
     mean,
     ratio,
-    root_mean,
+    rms,
     sd,
     usual_levels,
 )
@@ -33,26 +33,7 @@ Array = NDArray[np.float64]
 Key = tuple[str, str]
 """Quantity, and the name of what it is of."""
 
-STATISTICS: dict[str, tuple[Statistic, str]] = {
-    "bias": (mean, "error"),
-    "sd": (sd, "error"),
-    "sigma_priori": (mean, "sigma_priori"),
-    "sigma_posteriori": (mean, "sigma_posteriori"),
-    "sd_ratio": (ratio, "sigma_and_error"),
-    "coverage": (mean, "inside"),
-    "correlation": (correlation, "error"),
-    "variance_factor": (mean, "variance_factor"),
-    "tilt_rms": (root_mean, "tilt_squared"),
-}
-"""Each statistic of a cell, and the rows of `_numbers` that it is of: bias and standard
-deviation of the errors, the mean standard deviations that are stated, `sd_ratio` of those a
-posteriori and the sd, share of the nominal 95 % intervals that hold the truth, correlations below
-the diagonal, mean of σ̂0², and the rms of roll and pitch over attitudes and calibrations."""
-
 TILT = "tilt"
-QUANTITIES = {"error": "error", "sd_posteriori": "sigma_posteriori", TILT: "tilt"}
-"""Quantities that have quantiles, of each parameter, and of each of `TILTS` the rms over attitudes;
-and the rows of `_numbers` that they are of."""
 ANGLES = ("roll", "pitch")
 TILTS = (*ANGLES, "both")
 """Names of the tilt errors that have quantiles: of each angle by itself, and of the larger of the
@@ -69,7 +50,7 @@ class CellStatistics:
     simulated, converged : int, number of calibrations that were simulated, and that converged
     control : str, which control variate the estimates have: `linear` or `none`
     correlation : (u, u) array, mean correlations of Σ_xx; None of a cell that is not estimable
-    estimates : dict of `STATISTICS` to Estimates; empty if nothing converged
+    estimates : dict of statistics as in `NUMBERS`, to Estimates; empty if nothing converged
     first : errors and sigmas a posteriori of the first calibration that converged, (u,) each
     levels : (k,) array, probabilities of the quantiles
     quantiles : dict of quantity and name to Estimates, (k,); empty if nothing converged
@@ -114,73 +95,98 @@ def statistics(
     counts = len(converged), count, control, correlation
     if not count:
         return CellStatistics(cell, *counts)
-    own = _numbers(cell, replicates.simulated, count)
-    theory = _numbers(cell, replicates.linear, len(converged))
     expected = {} if known is None else known.statistics
-    estimates = {
-        name: controlled(
-            statistic, own[number], theory.get(number), expected.get(name, np.nan), converged
-        )
-        for name, (statistic, number) in STATISTICS.items()
-        if name != "correlation" or count > cell.n_unknowns
-    }
     at = usual_levels(count) if levels is None else np.asarray(levels, dtype=float)
     by_theory = {} if known is None else known.quantiles(at)
-    quantiles = {}
-    for quantity, number in QUANTITIES.items():
-        if np.isnan(own[number]).any():  # sds a posteriori need redundancy
-            continue
-        nothing = np.full((len(own[number]), len(at)), np.nan)
-        values, errors = by_theory.get(quantity, (nothing, nothing))
-        beside = theory.get(number, [None] * len(nothing))
-        names = TILTS if quantity == TILT else cell.parameter_units
-        for i, name in enumerate(names):
-            quantiles[quantity, name] = controlled_quantiles(
-                at, own[number][i], beside[i], values[i], converged, errors[i]
-            )
-    first = own["error"][:, 0], own["sigma_posteriori"][:, 0]
-    return CellStatistics(cell, *counts, estimates, first, at, quantiles)
-
-
-def _numbers(cell: Cell, blocks: Sequence[Block], count: int) -> dict[str, Array]:
-    """Numbers as of `_numbers_of` of all blocks, of which so many calibrations converged."""
-    numbers: dict[str, Array] = {}
-    end = 0
-    for block in blocks:
-        start, end = end, end + int(block.converged.sum())
-        for name, part in _numbers_of(cell, block).items():
-            if name not in numbers:
-                numbers[name] = np.empty((len(part), count), part.dtype)
-            numbers[name][:, start:end] = part
-    if numbers:
-        numbers["sigma_posteriori"], numbers["error"] = np.split(numbers["sigma_and_error"], 2)
-    return numbers
-
-
-def _numbers_of(cell: Cell, block: Block) -> dict[str, Array]:
-    """Numbers of the c calibrations that converged, (k, c) each, SI; NaN what needs redundancy.
-
-    They are `sigma_priori` and `inside` of each parameter (the last says whether the nominal 95 %
-    interval, estimate ± t σ a posteriori, holds the truth), `sigma_and_error`, the σ a posteriori
-    and then the errors, `variance_factor`, and over the attitudes the mean `tilt_squared` of roll
-    and pitch, and the rms `tilt` as in `TILTS`.
-    """
-    estimates, sigma, omega = (
-        np.compress(block.converged, each.T, axis=-1)
-        for each in (block.estimates, block.sigma_priori, block.omega)
-    )
-    factor = omega[None] / (block.redundancy or np.nan)
-    error, posteriori = estimates - cell.true_values[:, None], np.sqrt(factor) * sigma
-    squares = cell.tilt_error.squares(estimates[: cell.estimated_model.n_parameters].T).T
-    tilt = np.sqrt(squares)
-    return {
-        "sigma_priori": sigma,
-        "sigma_and_error": np.concatenate([posteriori, error]),
-        "inside": np.abs(error) <= sigmas_95(block.redundancy) * posteriori,
-        "variance_factor": factor,
-        "tilt_squared": squares,
-        "tilt": np.vstack([tilt, tilt.max(axis=0)]),
+    sides = [blocks for blocks in replicates if blocks]
+    values: dict[str, list[Value]] = {}
+    quantiles: dict[Key, Estimates] = {}
+    for number in NUMBERS:
+        rows = [_rows(number, cell, blocks) for blocks in sides]
+        for name, statistic in number.statistics.items():
+            values[name] = [statistic(each) for each in rows]
+        if number.quantity and not np.isnan(rows[0]).any():  # sds a posteriori need redundancy
+            exact = by_theory.get(number.quantity, (UNKNOWN.value, UNKNOWN.value))
+            found = controlled_quantiles(at, converged, *exact, *rows)
+            names = TILTS if number.quantity == TILT else cell.parameter_units
+            quantiles |= {(number.quantity, name): found[i] for i, name in enumerate(names)}
+    sds = zip(values["sigma_posteriori"], values["sd"], strict=True)
+    values["sd_ratio"] = [ratio(*each) for each in sds]
+    estimates = {
+        name: controlled(converged, expected.get(name, np.nan), *each)
+        for name, each in values.items()
+        if name != "correlation" or count > cell.n_unknowns
     }
+    block = next(block for block in replicates.simulated if block.converged.any())
+    numbers = _errors(cell, block), _posteriori(cell, block)
+    error, sigma = (each[:, block.converged.argmax()] for each in numbers)
+    return CellStatistics(cell, *counts, estimates, (error, sigma), at, quantiles)
+
+
+# --- numbers of each calibration (k, R), SI -------------------------------------------------------
+
+
+class Number(NamedTuple):
+    """Numbers of each calibration of a block, (k, R), and what a study says of them.
+
+    Attributes
+    ----------
+    of_block : function of a cell and a block
+    statistics : dict of name to Statistic
+    quantity : str, name of what has quantiles; empty if nothing
+    """
+
+    of_block: Callable[[Cell, Block], Array]
+    statistics: Mapping[str, Callable[[Array], Value]]
+    quantity: str = ""
+
+
+def _errors(cell: Cell, block: Block) -> Array:
+    return (block.estimates - cell.true_values).T
+
+
+def _factor(cell: Cell, block: Block) -> Array:
+    """Variance of unit weight σ̂0²; NaN without redundancy, as all that follows from it."""
+    return block.omega[None] / (block.redundancy or np.nan)
+
+
+def _posteriori(cell: Cell, block: Block) -> Array:
+    return np.asarray(np.sqrt(_factor(cell, block)) * block.sigma_priori.T)
+
+
+def _inside(cell: Cell, block: Block) -> Array:
+    """Whether the nominal 95 % intervals, estimate ± t σ a posteriori, hold the truth."""
+    half = sigmas_95(block.redundancy) * _posteriori(cell, block)
+    return np.asarray(np.abs(_errors(cell, block)) <= half)
+
+
+def _tilts(cell: Cell, block: Block) -> Array:
+    """Rms over attitudes of the tilt errors, as in `TILTS`."""
+    tilt = cell.tilt_error.rms(block.estimates[:, : cell.estimated_model.n_parameters]).T
+    return np.vstack([tilt, tilt.max(axis=0)])
+
+
+NUMBERS = (
+    Number(_errors, {"bias": mean, "sd": sd, "correlation": correlation}, "error"),
+    Number(_posteriori, {"sigma_posteriori": mean}, "sd_posteriori"),
+    Number(_tilts, {"tilt_rms": lambda tilts: rms(tilts[: len(ANGLES)])}, TILT),
+    Number(lambda cell, block: block.sigma_priori.T, {"sigma_priori": mean}),
+    Number(_inside, {"coverage": mean}),
+    Number(_factor, {"variance_factor": mean}),
+)
+"""What statistics are of. `sd_ratio`, of the mean sigma a posteriori and the sd, follows from two;
+`correlation` is below the diagonal; quantiles of the tilt are over calibrations."""
+
+
+def _rows(number: Number, cell: Cell, blocks: Sequence[Block]) -> Array:
+    """Numbers of the c calibrations of all blocks that converged, (k, c)."""
+    ends = np.cumsum([0, *(block.converged.sum() for block in blocks)])
+    for block, start, end in zip(blocks, ends, ends[1:], strict=False):
+        part = np.compress(block.converged, number.of_block(cell, block), axis=1)
+        if block is blocks[0]:
+            rows = np.empty((len(part), ends[-1]), part.dtype)
+        rows[:, start:end] = part
+    return rows
 
 
 def simulated_statistics(

@@ -15,7 +15,7 @@ from accelstudy.study.estimate import (
     correlation,
     mean,
     ratio,
-    root_mean,
+    rms,
     sd,
 )
 from accelstudy.study.statistics import TILT, simulated_statistics
@@ -40,9 +40,9 @@ KNOWN = {
     "mean": (mean, np.zeros(3)),
     "share": (mean, np.full(3, 0.95)),
     "sd": (sd, SIGMA),
-    "rms": (root_mean, SIGMA),
+    "rms": (rms, SIGMA),
     "correlation": (correlation, np.array([0.6, 0.0, -0.3])),
-    "ratio": (ratio, np.sqrt(2 / np.pi) * SIGMA / SIGMA),
+    "ratio": (lambda x: ratio(mean(np.abs(x)), sd(x)), np.sqrt(2 / np.pi) * SIGMA / SIGMA),
 }
 """Statistics of the normal y = SIGMA · ROOT · z, of which the ratio is E|y| / sd(y)."""
 
@@ -50,14 +50,13 @@ KNOWN = {
 def numbers(kind, x):
     """The numbers of which `kind` is a statistic."""
     inside = np.abs(x) <= stats.norm.ppf(0.975) * SIGMA
-    kinds = {"share": inside.astype(float), "rms": x**2, "ratio": np.hstack([np.abs(x), x])}
-    return kinds.get(kind, x)
+    return inside.astype(float) if kind == "share" else x
 
 
 def estimated(statistic, x, y, known, converged=None):
     """The estimate of numbers (R, k) of calibrations and of linear theory."""
     converged = np.ones(len(y), bool) if converged is None else converged
-    return controlled(statistic, x.T, y.T, np.asarray(known), converged)
+    return controlled(converged, np.asarray(known), statistic(x.T), statistic(y.T))
 
 
 def samples(n, apart, kind, seeds=OFTEN):
@@ -155,7 +154,7 @@ def test_quantiles_of_a_normal_sum(apart):
     for _ in range(OFTEN):
         y = rng.standard_normal(1000)
         x = y + apart * rng.standard_normal(1000)
-        found = controlled_quantiles(levels, x, y, known, np.ones(1000, bool))
+        found = controlled_quantiles(levels, np.ones(1000, bool), known, 0, x[None], y[None])[0]
         z.append((found.value - known * np.hypot(1, apart)) / found.error)
         gains.append(found.gain)
     rms = np.sqrt(np.mean(np.square(z), axis=0))
