@@ -46,7 +46,6 @@ def study(name: str, **grid: object) -> dict[str, object]:
         "study": name,
         "paper": False,
         "sensitivity": None,
-        "presets": None,
         "leveling": {"attitudes": 50},
         "grids": [{"models": [MODEL], "approaches": ["gravity"], **grid}],
     }

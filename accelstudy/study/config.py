@@ -41,7 +41,7 @@ from accelstudy.leveling.error import ATTITUDES, MAX_TILT_GON
 from accelstudy.noise_effects import NoiseEffect, get_noise_effect
 from accelstudy.schemes import Scheme, get_scheme, scheme_names
 from accelstudy.schemes.files import known_scheme
-from accelstudy.sensors.models import MODELS, NINE, PRESETS, compose, get_model
+from accelstudy.sensors.models import MODELS, NINE, compose, get_model
 from accelstudy.sensors.sensor import SensorModel
 from accelstudy.simulation.hold_plan import HoldPlan
 from accelstudy.simulation.sessions import Noise, sigma_of_mean
@@ -335,13 +335,6 @@ class Grid(ConfigSection):
         return self
 
 
-class Presets(ConfigSection):
-    """The rows of the paper's Table 1, each with its own model and scheme."""
-
-    replicates: kinds.Replicates = Field(description="simulated calibrations per row and approach")
-    approaches: Approaches
-
-
 class LevelingConfig(ConfigSection):
     """Where the tilt error that a calibration leaves is evaluated."""
 
@@ -426,6 +419,7 @@ class Study(Configuration):
     retired = {  # noqa: RUF012
         "keep": "every calibration is stored in estimates/: leave it out",
         "control": "linear theory is always the control variate: leave it out",
+        "presets": "the rows of Table 1 are cells of `grids`: leave it out",
         "schemes": "write positions into a YAML file, and its path into `grids`",
         "rare": "quantiles of small shares, such as 1e-6, are in the table quantiles where "
         "replicates are enough: leave it out",
@@ -453,8 +447,7 @@ class Study(Configuration):
     models: dict[Annotated[str, AfterValidator(_own_name)], Composition] = Field(
         default_factory=dict, description="models of your own: name and effects"
     )
-    grids: list[Grid] = Field(default_factory=list, description="sets of cells")
-    presets: Presets | None = Field(None, description="Table 1 of the paper")
+    grids: list[Grid] = Field(description="sets of cells", min_length=1)
     leveling: LevelingConfig = LevelingConfig()
     sensitivity: SensitivityConfig | None = Field(None, description="figures 4 to 6")
     angle_unit: Literal["gon", "deg"] | None = Field(
@@ -499,8 +492,6 @@ class Study(Configuration):
         for name, quantity in self.sensor.items():
             with _at(f"sensor.{name}"):
                 quantity.in_si(get_effect(name))
-        if not self.grids and self.presets is None:
-            raise InputError("neither grids nor presets are given: the study has no cells")
         simulated = [] if self.simulated_effects is None else [self.simulated_effects]
         models = [*simulated, *(model for grid in self.grids for model in grid.models)]
         for effect in {e.spec: e for model in models for e in model.effects}.values():
@@ -514,24 +505,14 @@ class Study(Configuration):
         elif self.paper:
             raise InputError("paper: true needs the block `sensitivity` (figures 4 to 6)")
 
-    @property
-    def all_grids(self) -> list[Grid]:
-        """The grids, and the presets as grids."""
-        if self.presets is None:
-            return self.grids
-        shared = self.presets.model_dump()
-        rows = [{"models": row.model, "schemes": row.scheme, **shared} for row in PRESETS]
-        return [*self.grids, *map(Grid.model_validate, rows)]
-
     @cached_property
     def cells(self) -> list[Cell]:
         """All cells, in the order of the configuration, without repetition.
 
-        A cell that occurs more than once, such as in Table 1 and in a grid, runs once, with the
-        largest number of replicates.
+        A cell that occurs more than once runs once, with the largest number of replicates.
         """
         cells: dict[str, Cell] = {}
-        for cell in (cell for grid in self.all_grids for cell in self._cells_of(grid)):
+        for cell in (cell for grid in self.grids for cell in self._cells_of(grid)):
             earlier = cells.get(cell.name)
             if earlier is None or cell.replicates > earlier.replicates:
                 cells[cell.name] = cell

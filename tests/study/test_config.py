@@ -172,9 +172,6 @@ def test_the_hash_of_a_configuration_is_that_of_what_numbers_depend_on():
 def test_paper_with_all_it_needs():
     study = make_study(paper=True, sensitivity=SENSITIVITY)
     assert study.paper
-    # A preset's cell will do as well.
-    preset = {**SENSITIVITY, "scheme": "faces-edges-18"}
-    assert make_study(paper=True, sensitivity=preset, grids=[], presets={"replicates": 5}).paper
     # The gravity-based cell is the same whatever the robot's accuracy, the robot's is not.
     with pytest.raises(InputError, match=f"{NINE}/mclaren-24/robot"):
         make_study(sensitivity=SENSITIVITY, grids=[grid(robot_sigma_mgon=[1])])

@@ -11,19 +11,17 @@ from study_helpers import NINE, content, grid, run_study
 from accelstudy.basics.errors import InputError
 from accelstudy.drawing import style
 from accelstudy.effects import effect_names
-from accelstudy.sensors.models import MODELS, PRESETS
+from accelstudy.sensors.models import MODELS
 from accelstudy.study.config import Study, parse_study
 from accelstudy.study.figures import caption, draw, figure_names, get_figure, write_figure
 from accelstudy.study.figures.attitudes import sigma_table
 from accelstudy.study.figures.calibrations import correlation_table, single_runs
 from accelstudy.study.figures.factors import FACTORS
 from accelstudy.study.figures.panels import tilt_errors
-from accelstudy.study.figures.table_1 import preset_table
 from accelstudy.study.sensitivity import sensitivity_table
 
 PAPER = content(
     grids=[grid(schemes=["faces-6", "mclaren-24"], replicates=30), grid(f"{NINE}-crossaxis")],
-    presets={"replicates": 5},
     leveling={"attitudes": 10},
     sensitivity={
         **{"base_samples": 32},
@@ -61,7 +59,7 @@ OTHERS = [*(f"sweep-{factor.name}" for factor in FACTORS)]
 
 
 def test_a_paper_study_has_the_figures_of_the_paper_and_of_every_study():
-    expected = [f"figure-{n}" for n in range(2, 9)] + ["leveling-overview", "table-1"]
+    expected = [f"figure-{n}" for n in range(2, 9)] + ["leveling-overview"]
     assert {*expected} <= {*ALL}
     assert {*OTHERS}.isdisjoint(ALL)
     assert {*OTHERS} < {*figure_names()}
@@ -153,21 +151,6 @@ def test_a_panel_has_the_lines_of_one_group_and_the_legend_each_once(name, figur
         assert len(colours - {style.INK}) <= 1
     symbols = [text.get_text() for text in drawn.legends[0].get_texts()]
     assert len(symbols) == len(set(symbols)) > 3
-
-
-def test_table_1_has_the_mean_sd_of_a_group_and_the_tilt_error(tables, paper):
-    cell = f"{NINE}/fibonacci-36/robot"
-    place = [(p.model, p.scheme) for p in PRESETS].index((NINE, "fibonacci-36"))
-    table = preset_table(tables, paper)
-    rows = table[(table["y"].round() == place) & (table["approach"] == "robot")]
-    value = rows.set_index("group")["value"]
-    summary = tables["summary"][tables["summary"]["cell"] == cell]
-    biases = summary[summary["parameter"].str.startswith("b_")]
-    assert value["bias"] == pytest.approx(biases["sd_empirical"].mean())
-    assert value["roll"] == tables["leveling"].set_index("cell")["roll_rms_mgon"][cell]
-    failed = table[table["value"].isna() & ~table["estimable"]]
-    assert len(failed) == 3 * 3  # non-orthogonality, cross-axis angles and roll of three rows
-    assert set(failed["approach"]) == {"gravity"}
 
 
 def test_the_tilt_overview_shows_rms_quantile_and_the_noise_of_a_reading(tables, figure_of):

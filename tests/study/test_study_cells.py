@@ -11,7 +11,7 @@ from usual import PAPER_TRUTH
 
 from accelstudy.approaches import approach_names
 from accelstudy.basics.units import MGON
-from accelstudy.sensors.models import MODELS, PRESETS
+from accelstudy.sensors.models import MODELS
 from accelstudy.simulation.sessions import BLOCK, Noise
 from accelstudy.study.cell import fanned_out
 
@@ -85,12 +85,6 @@ def test_a_repeated_cell_runs_once_with_the_larger_number():
     cells = make_cells(grid(replicates=20), grid(replicates=30), grid(replicates=10))
     assert [*cells] == [GRAVITY, ROBOT]
     assert {cell.replicates for cell in cells.values()} == {30}
-
-
-def test_presets_are_the_rows_of_table_1():
-    study = make_study(grids=[], presets={"replicates": 5, "approaches": "robot"})
-    names = [cell.name for cell in study.cells]
-    assert sorted(names) == sorted({f"{p.model}/{p.scheme}/robot" for p in PRESETS})
 
 
 def test_cells_fan_out_by_what_they_have_in_common():

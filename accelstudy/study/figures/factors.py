@@ -110,7 +110,7 @@ def _may_vary(study: Study, factor: Factor) -> bool:
         named = [[scheme.name for scheme in grid.schemes] for grid in study.grids]
         chosen = [names for names in named if names != [*scheme_names()]]
         return any(len(names) > len({*map(family, names)}) for names in chosen)
-    values = [getattr(grid, factor.column) for grid in study.all_grids]
+    values = [getattr(grid, factor.column) for grid in study.grids]
     listed = {value for each in values if each is not None for value in each}
     return len(listed) + (None in values) > 1
 

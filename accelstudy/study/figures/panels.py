@@ -7,7 +7,7 @@ is here: labels, ticks, colour bar and legend, and what stands where there is no
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from typing import TYPE_CHECKING, Any, TypeAlias
 
 import numpy as np
@@ -32,6 +32,7 @@ smaller and yet can be significant."""
 ANGLES = ("roll", "pitch")
 FAILED: style.Style = {"linestyle": "", "marker": "x", "markersize": 4}
 """Mark of what cannot be estimated, or has not converged."""
+LINES, MARKERS = ("-", "--", ":", "-."), ("o", "^", "s", "D", "v", "P", "X", "*")
 BESIDE = {"title": [(-1, 0), (0, -1)], "xlabel": [(1, 0)], "ylabel": [(0, -1)]}
 """Where a panel's neighbours are, down and right, whose label serves for both."""
 
@@ -155,8 +156,7 @@ def group_sds(summary: DataFrame) -> DataFrame:
     """Mean empirical sd of each group of parameters of each cell.
 
     `value` is in the `unit` shown, NaN if there is none. `bias` is the rms bias if it is
-    significant for all parameters of the group and above `SMALLEST_BIAS`, and `estimable` says
-    whether all can be estimated.
+    significant for all parameters of the group and above `SMALLEST_BIAS`.
     """
     certain = (summary["bias_ci95_low"] > 0) | (summary["bias_ci95_high"] < 0)
     large = summary["bias"].abs() > SMALLEST_BIAS * summary["sd_empirical"]
@@ -165,9 +165,7 @@ def group_sds(summary: DataFrame) -> DataFrame:
         squared=(summary["bias"] ** 2).where(certain & large, np.inf),
     )
     groups = summary.groupby(["cell", "group", "unit"], sort=False)
-    sds = groups.agg(
-        value=("sd_empirical", "mean"), squared=("squared", "mean"), estimable=("estimable", "all")
-    ).reset_index()
+    sds = groups.agg(value=("sd_empirical", "mean"), squared=("squared", "mean")).reset_index()
     bias = sds["squared"].where(np.isfinite(sds["squared"])) ** 0.5
     sds = sds.assign(bias=bias, label=sds["group"].map(style.group_label), quantity="sd")
     return in_shown_units(in_group_order(sds), "value", "bias")
@@ -196,10 +194,9 @@ def accuracies(tables: Tables) -> DataFrame:
     """
     import pandas as pd
 
-    summary = tables["summary"]
-    tilt = tilt_errors(summary[["cell"]].drop_duplicates(), tables["leveling"])
-    tilt = tilt.assign(estimable=tilt["value"].notna(), label=tilt["group"] + " error")
-    table = pd.concat([group_sds(summary), tilt], ignore_index=True)
+    tilt = tilt_errors(tables["cells"][["cell"]], tables["leveling"])
+    tilt = tilt.assign(label=tilt["group"] + " error")
+    table = pd.concat([group_sds(tables["summary"]), tilt], ignore_index=True)
     return table.assign(value=table["value"].where(table["value"] > 0))
 
 
@@ -212,6 +209,14 @@ def points(ax: Axes, rows: DataFrame, x: str = "x", y: str = "y", **look: Any) -
         colour, marker = style.approach_colour(str(approach)), style.approach_marker(str(approach))
         usual = {"color": colour, "marker": marker, "linestyle": ""}
         ax.plot(its[x].to_numpy(), its[y].to_numpy(), **{**usual, **look})
+
+
+def line_looks(names: Iterable[str], **look: Any) -> dict[str, style.Style]:
+    """Lines and markers by which names are told apart, whatever their colour."""
+    return {
+        name: {"linestyle": LINES[(i + i // 8) % 4], "marker": MARKERS[i % 8], **look}
+        for i, name in enumerate(dict.fromkeys(names))
+    }
 
 
 def handle(label: str, **look: Any) -> Line:

@@ -9,13 +9,11 @@ import numpy as np
 from accelstudy.drawing import style
 from accelstudy.schemes import get_scheme
 from accelstudy.study.figures.factors import FACTORS, POSITIONS, Factor, swept, varies
-from accelstudy.study.figures.panels import FAILED, accuracies, handle, panels
+from accelstudy.study.figures.panels import FAILED, accuracies, handle, line_looks, panels
 from accelstudy.study.figures.registry import Axes, DataFrame, Figure, Study, Tables, register
 
 SYSTEMATIC = "gravity-error"
 """The factor whose effect is a bias, which is drawn beside the sd."""
-MARKERS = ("o", "^", "s", "D", "v", "P", "X", "*")
-LINES = ("-", "--", ":", "-.")
 TOP = 0.95
 """Height of the crosses of the first scheme in a panel, as a share."""
 NONE, SOME, BIAS = "not estimable, or none converged", "some did not converge", "significant |bias|"
@@ -40,10 +38,7 @@ def over_factor(tables: Tables, study: Study, factor: Factor) -> Figure:
     the group and above 1 % of their sds.
     """
     table = sweep_table(tables, study, factor)
-    looks: dict[str, style.Style] = {}
-    for i, subject in enumerate(table["subject"].unique()):
-        line, marker = LINES[(i + i // len(MARKERS)) % len(LINES)], MARKERS[i % len(MARKERS)]
-        looks[subject] = {"linestyle": line, "marker": marker, "markersize": 3}
+    looks = line_looks(table["subject"], markersize=3)
 
     def draw(ax: Axes, rows: DataFrame) -> None:
         for (subject, approach), line in rows.sort_values("x").groupby(["subject", "approach"]):
@@ -109,5 +104,5 @@ def sweep_table(tables: Tables, study: Study, factor: Factor) -> DataFrame:
     )
     if factor is not POSITIONS:
         cells["subject"] = [get_scheme(name).title for name in cells["subject"]]
-    table = accuracies(tables).drop(columns="estimable").merge(cells, on="cell")
+    table = accuracies(tables).merge(cells, on="cell")
     return table if factor.name == SYSTEMATIC else table.assign(bias=np.nan)

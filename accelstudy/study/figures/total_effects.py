@@ -4,12 +4,9 @@ from __future__ import annotations
 
 from accelstudy.basics.units import GON, attitude_unit, to_attitude
 from accelstudy.drawing import style
-from accelstudy.study.figures.panels import handle, in_group_order, narrow, panels
+from accelstudy.study.figures.panels import handle, in_group_order, line_looks, narrow, panels
 from accelstudy.study.figures.registry import Axes, DataFrame, Figure, Study, Tables, register
 
-LINE_STYLES = ("-", "--", ":")
-MARKERS = ("o", "^", "s")
-"""Styles of the first, second and third member of a group."""
 THIN: style.Style = {"linewidth": 0.9, "markersize": 1.8}
 MIN_PERCENT = 1.0
 """Percent; inputs that are below everywhere are left out."""
@@ -39,10 +36,7 @@ def effects_over_roll(tables: Tables, study: Study, number: int, output: str) ->
     )
     looks: dict[str, style.Style] = {}
     for name, members in table.groupby("group", sort=False)["input"]:
-        for i, member in enumerate(members.unique()):
-            line, marker = LINE_STYLES[i % 3], MARKERS[(i + i // 3) % 3]
-            colour = style.group_colour(str(name))
-            looks[member] = {"color": colour, "linestyle": line, "marker": marker, **THIN}
+        looks |= line_looks(members, color=style.group_colour(str(name)), **THIN)
 
     def draw(ax: Axes, rows: DataFrame) -> None:
         ax.axhline(0, color=style.INK, linewidth=0.6)
