@@ -58,7 +58,6 @@ TEMPERATURE = Range(-273.15, 1e4, "°C")
 VIBRATION = Range(0.0, 1e4, "m/s²")
 TIME = Range(-1e12, 1e12, "s")
 INTERVAL = Range(1e-6, 1e6, "s")
-DURATION = Range(1e-6, 1e7, "s")
 RATE = Range(1e-6, 1e9, "per second")
 # Parameters of sensors, in SI: no sensor has larger ones, and their squares stay finite.
 PARAMETER = Range(-1e6, 1e6)

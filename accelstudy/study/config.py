@@ -44,7 +44,7 @@ from accelstudy.schemes.files import known_scheme
 from accelstudy.sensors.models import MODELS, NINE, compose, get_model
 from accelstudy.sensors.sensor import SensorModel
 from accelstudy.simulation.hold_plan import HoldPlan
-from accelstudy.simulation.sessions import Noise, sigma_of_mean
+from accelstudy.simulation.sessions import Noise
 from accelstudy.study.cell import Cell
 from accelstudy.study.compiling import with_compiled
 
@@ -212,18 +212,14 @@ Simulated = Annotated[SensorModel | None, _written(OneOrMore[str], _simulated, _
 class SensorNoise(ConfigSection):
     """White noise of the accelerometer."""
 
-    sigma_mps2: kinds.SigmaForce = Field(0.002, description="standard deviation per axis, m/s²")
-    per: Literal["position", "sample"] = Field(
-        "position", description="whether sigma_mps2 is that of a position's mean or of one sample"
+    retired = dict.fromkeys(
+        ("per", "rate_hz", "duration_s"),
+        "sigma_mps2 is that of a position's mean, of n samples σ/√n: leave it out",
     )
-    rate_hz: kinds.Rate = Field(100.0, description="sampling rate; used with per: sample")
-    duration_s: kinds.Duration = Field(2.0, description="duration of a hold; used with per: sample")
 
-    def of_mean(self, sigma_mps2: float) -> float:
-        """Noise of a position's mean, m/s², from a configured noise (per position or sample)."""
-        if self.per == "position":
-            return sigma_mps2
-        return sigma_of_mean(sigma_mps2, self.rate_hz, self.duration_s)
+    sigma_mps2: kinds.SigmaForce = Field(
+        0.002, description="standard deviation of the mean of a position, per axis, m/s²"
+    )
 
 
 class RobotNoise(ConfigSection):
@@ -537,7 +533,7 @@ class Study(Configuration):
                 approach=approach.name,
                 replicates=grid.replicates,
                 noise=Noise(
-                    self.noise.sensor.of_mean(settings["sensor_sigma_mps2"]),
+                    settings["sensor_sigma_mps2"],
                     settings["robot_sigma_mgon"] * MGON if approach.uses_angles else 0.0,
                     settings["gravity_sigma_mps2"],
                     settings["gravity_error_mps2"],
@@ -563,11 +559,6 @@ class Study(Configuration):
             yaw=holds.yaw,
             seed=self.seed,
         )
-
-    @property
-    def sigma_force(self) -> float:
-        """Default noise of a position's mean, m/s²."""
-        return self.noise.sensor.of_mean(self.noise.sensor.sigma_mps2)
 
     def truth(self, effects: Iterable[str]) -> dict[str, float]:
         """Return the true parameters of the given effects in SI; those not configured are zero."""

@@ -64,13 +64,15 @@ class Replicates(NamedTuple):
 
 
 def simulate(cell: Cell, seed: int) -> Replicates:
-    """Simulate and calibrate all replicates of an estimable cell.
+    """Simulate and calibrate all replicates of a cell; none if it is not estimable.
 
     Parameters
     ----------
     cell : Cell
     seed : int, of the study
     """
+    if not cell.estimability.estimable:
+        return Replicates([], [])
     calibrate, theory = calibrator(cell), cell.linear_theory
     drawn = cell.ideal.draw_blocks(
         cell.noise,

@@ -250,11 +250,10 @@ class Simulation(Result):
 
     def _joined(self, rows: Iterable[Mapping[str, Any]]) -> pd.DataFrame:
         """Table of all cells, whose last column is its index; of several, their names are, too."""
-        tables = [pd.DataFrame(one) for one in rows]
-        tables = [table.set_index(table.columns[-1]) for table in tables]
-        if len(tables) == 1:
-            return tables[0]
-        return pd.concat(tables, keys=[cell.name for cell in self.cells], names=["cell"])
+        tables = (pd.DataFrame(one) for one in rows)
+        each = [table.set_index(table.columns[-1]) for table in tables]
+        table = pd.concat(each, keys=[cell.name for cell in self.cells], names=["cell"])
+        return table.droplevel("cell") if len(each) == 1 else table
 
     @cached_property
     def estimates(self) -> pd.DataFrame:
@@ -266,7 +265,6 @@ class Simulation(Result):
         each = (
             table
             for cell in self.cells
-            if cell.estimability.estimable
             for table in estimates_tables(cell, simulate(cell, self._seed))
         )
         table = pa.concat_tables([ESTIMATES.empty_table(), *each])

@@ -8,7 +8,7 @@ import pandas as pd
 
 from accelstudy.study.claims.quantities import ClaimData
 from accelstudy.study.claims.verdicts import judge
-from accelstudy.study.config import Study, read_study
+from accelstudy.study.config import read_study
 from accelstudy.study.sensitivity import sensitivity_table, shapley_table
 from accelstudy.study.tables import simulated_tables
 
@@ -32,16 +32,11 @@ def run_study(*configurations: str | Path) -> dict[str, pd.DataFrame]:
     InputError
         If a file cannot be read or does not fit the schema.
     """
-    return study_tables(read_study(*configurations))
-
-
-def study_tables(study: Study) -> dict[str, pd.DataFrame]:
-    """Run a checked study in memory; see `run_study`."""
+    study = read_study(*configurations)
     tables = simulated_tables(study.cells, study.seed)
     if study.sensitivity is not None:
         tables["sensitivity"] = sensitivity_table(study, tables["summary"])
         tables["shapley"] = shapley_table(study, tables["summary"], tables["correlations"])
     if study.paper:
-        data = ClaimData(study, tables)
-        tables["claims"] = judge(data)
+        tables["claims"] = judge(ClaimData(study, tables))
     return tables

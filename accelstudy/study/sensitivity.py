@@ -34,7 +34,7 @@ def sensitivity_table(study: Study, summary: pd.DataFrame) -> pd.DataFrame:
         analysis: leveling_sensitivity(
             settings.roll_gon,
             settings.pitch_gon,
-            study.sigma_force,
+            study.noise.sensor.sigma_mps2,
             settings.base_samples,
             study.seed,
             g=study.gravity_mps2,
@@ -65,7 +65,7 @@ def shapley_table(study: Study, summary: pd.DataFrame, correlations: pd.DataFram
         tables[approach] = leveling_shares(
             settings.roll_gon,
             settings.pitch_gon,
-            study.sigma_force,
+            study.noise.sensor.sigma_mps2,
             covariance=matrix.loc[names, names].to_numpy() * np.outer(sigma, sigma),
             g=study.gravity_mps2,
             **sensor,

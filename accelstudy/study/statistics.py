@@ -82,10 +82,12 @@ def statistics(
 
     Parameters
     ----------
-    cell : Cell, estimable
-    replicates : Replicates
+    cell : Cell
+    replicates : Replicates; none of a cell that is not estimable
     levels : probabilities of the quantiles; by default those that so many replicates can have
     """
+    if not replicates.simulated:
+        return CellStatistics(cell)
     converged = np.concatenate([block.converged for block in replicates.simulated])
     known = KnownValues(cell) if replicates.linear else None
     control = "linear" if known is not None and len(converged) >= MIN_REPLICATES else "none"
@@ -190,23 +192,7 @@ def _rows(number: Number, cell: Cell, blocks: Sequence[Block]) -> Array:
 
 
 def simulated_statistics(
-    cell: Cell,
-    seed: int,
-    levels: Sequence[float] | Array | None = None,
-    keep: Callable[[Cell, Replicates], object] | None = None,
+    cell: Cell, seed: int, levels: Sequence[float] | Array | None = None
 ) -> CellStatistics:
-    """Simulate a cell and take its statistics; without calibrations if it is not estimable.
-
-    Parameters
-    ----------
-    cell : Cell
-    seed : int, of the study
-    levels : as of `statistics`
-    keep : function that gets the cell with its replicates
-    """
-    if not cell.estimability.estimable:
-        return CellStatistics(cell)
-    replicates = simulate(cell, seed)
-    if keep is not None:
-        keep(cell, replicates)
-    return statistics(cell, replicates, levels)
+    """Simulate a cell, with the seed of a study, and take its `statistics`."""
+    return statistics(cell, simulate(cell, seed), levels)

@@ -16,17 +16,18 @@ from accelstudy.basics.units import GON, MGON, recorded_unit, to_recorded
 from accelstudy.files.tables import read_table, table_writer, write_table
 from accelstudy.study.cell import Cell
 from accelstudy.study.estimate import UNKNOWN, Estimates
-from accelstudy.study.replicates import ESTIMATES, Replicates, estimates_tables
+from accelstudy.study.replicates import ESTIMATES, estimates_tables, simulate
 from accelstudy.study.statistics import (
     ANGLES,
     TILT,
     TILTS,
     CellStatistics,
-    simulated_statistics,
+    statistics,
 )
 
 if TYPE_CHECKING:
     import pandas as pd
+    import pyarrow as pa
 
 Array = NDArray[np.float64]
 
@@ -39,7 +40,7 @@ TABLES = ("cells", "summary", "correlations", "leveling", "quantiles")
 def simulated_tables(
     cells: Sequence[Cell],
     seed: int,
-    keep: Callable[[Cell, Replicates], object] | None = None,
+    write: Callable[[pa.Table], None] | None = None,
 ) -> dict[str, pd.DataFrame]:
     """Simulate cells one after the other; return each of `TABLES`.
 
@@ -47,15 +48,18 @@ def simulated_tables(
     ----------
     cells : sequence of Cell
     seed : int, of the study
-    keep : function that gets each cell with its replicates
+    write : function that gets the rows of the estimates, table by table
     """
 
     def results() -> Iterator[CellStatistics]:
         for number, cell in enumerate(cells, 1):
-            found = simulated_statistics(cell, seed, keep=keep)
-            failed = found.simulated - found.converged
-            said = f"{found.simulated} replicates, {failed} not converged"
-            said = cell.estimability.reason or said
+            replicates = simulate(cell, seed)
+            if write is not None:
+                for table in estimates_tables(cell, replicates):
+                    write(table)
+            found = statistics(cell, replicates)
+            counts = f"{found.converged} of {found.simulated} replicates converged"
+            said = cell.estimability.reason or counts
             log.info("%d/%d %s: %s", number, len(cells), cell.name, said)
             yield found
 
@@ -79,12 +83,7 @@ def simulate_cells(
     """
     measured = ("estimate", "linear_estimate", "sigma_priori")
     with table_writer(outputs["estimates"], ESTIMATES, provenance, measured) as write:
-
-        def keep(cell: Cell, replicates: Replicates) -> None:
-            for table in estimates_tables(cell, replicates):
-                write(table)
-
-        tables = simulated_tables(cells, provenance["seed"], keep)
+        tables = simulated_tables(cells, provenance["seed"], write)
     for name in TABLES:
         write_table(outputs[name], tables[name], provenance)
 

@@ -6,14 +6,13 @@ The golden set keeps their numbers.
 import re
 
 import numpy as np
-import pandas as pd
 import pytest
 from page_helpers import text_of
 from study_helpers import NINE, PROVENANCE, grid, make_study, run_study
 from usual import PAPER_TRUTH, STANDARD_ERRORS
 
 from accelstudy.basics.units import MGON
-from accelstudy.files.tables import read_table, write_table
+from accelstudy.files.tables import write_table
 from accelstudy.leveling.sensitivity import leveling_sensitivity
 from accelstudy.sensors.models import get_model
 from accelstudy.study.claims import quantities
@@ -22,10 +21,8 @@ from accelstudy.study.claims.quantities import ClaimData, claim_table, single_re
 from accelstudy.study.claims.verdicts import (
     NOT_REPRODUCED,
     REPRODUCED,
-    TABLES,
     judge,
     judge_claim,
-    judge_claims,
 )
 from accelstudy.study.sensitivity import shapley_table
 from accelstudy.study.tables import with_derived
@@ -188,20 +185,3 @@ def test_every_claim_is_on_the_page_and_in_the_markdown(judged):
     assert "&lt;b&gt;&amp;&lt;/b&gt;" in claims_page(claims.assign(statement="<b>&</b>"))
     assert not re.search(r"\bnan\b", page + text, re.IGNORECASE)
     assert not re.search(r"(src|href)=[\"']https?:", page)
-
-
-def test_claims_as_the_workflow_judges_them(tables, folder, judged, tmp_path):
-    """From files to files."""
-    outputs = {
-        "claims": tmp_path / "claims.parquet",
-        "html": tmp_path / "claims.html",
-    }
-    judge_claims(
-        make_study(**KEYS),
-        {name: folder / f"{name}.parquet" for name in TABLES},
-        outputs,
-        PROVENANCE,
-    )
-    claims = read_table(outputs["claims"])
-    pd.testing.assert_frame_equal(claims.set_index("claim"), judged, check_dtype=False)
-    assert outputs["html"].read_text(encoding="utf-8").lower().startswith("<!doctype html>")

@@ -30,7 +30,7 @@ OVERLAYS = [ROOT / "config" / "smoke.yaml", *sorted((ROOT / "config" / "sweeps")
 def test_the_study_of_the_paper():
     study = read_study(CONFIG)
     assert study.gravity_mps2 == 9.80665
-    assert study.sigma_force == 0.002
+    assert study.noise.sensor.sigma_mps2 == 0.002
     assert study.noise.robot.sigma_mgon == 3.2
     truth = study.truth(["bias", "scale", "nonorthogonality"])
     assert [truth[f"b_{axis}"] for axis in "xyz"] == [0.05, 0.01, 0.03]
@@ -150,7 +150,7 @@ def test_names_become_the_things_that_they_name():
 def test_numbers_as_yaml_1_1_reads_them():
     """YAML 1.1 takes 2e-3 for text, as it has no point."""
     assert yaml.safe_load("2e-3") == "2e-3"
-    assert make_study(noise={"sensor": {"sigma_mps2": "2e-3"}}).sigma_force == 2e-3
+    assert make_study(noise={"sensor": {"sigma_mps2": "2e-3"}}).noise.sensor.sigma_mps2 == 2e-3
 
 
 @pytest.mark.parametrize(("effect", "values", "unit", "expected"), [

@@ -15,7 +15,7 @@ from study_helpers import NINE, grid, make_study, run_study
 from accelstudy.basics.units import angles_in
 from accelstudy.drawing.style import model_title
 from accelstudy.study.explorer import content
-from accelstudy.study.explorer.page import explorer_page, write_explorer
+from accelstudy.study.explorer.page import explorer_page
 from accelstudy.study.tables import TABLES
 
 CROSS = f"{NINE}-crossaxis"
@@ -52,8 +52,9 @@ def tables(folder):
 @pytest.fixture(scope="module")
 def written(study, tables, folder):
     """Path of the page."""
-    write_explorer(study, {name: tables[name] for name in TABLES}, folder / "explorer.html")
-    return folder / "explorer.html"
+    path = folder / "explorer.html"
+    path.write_text(explorer_page(study, {name: tables[name] for name in TABLES}), "utf-8")
+    return path
 
 
 @pytest.fixture(scope="module")

@@ -52,14 +52,6 @@ def test_noise_of_a_grid_is_in_the_name_and_in_the_cell():
     assert [cell.noise.sigma_force for cell in close.values()] == [0.001, 0.0010000001]
 
 
-def test_noise_per_sample():
-    sensor = {"per": "sample", "rate_hz": 100, "duration_s": 4}
-    cells = make_cells(grid(sensor_sigma_mps2=[0.002, 0.04]), noise={"sensor": sensor})
-    assert cells[GRAVITY].noise.sigma_force == pytest.approx(0.0001, rel=1e-14)
-    other = cells[f"{GRAVITY}/sensor_sigma_mps2=0.04"]
-    assert other.noise.sigma_force == pytest.approx(0.002, rel=1e-14)
-
-
 def test_the_robot_does_not_concern_the_gravity_approach():
     usual = make_cells(grid())[GRAVITY]
     swept = make_cells(grid(robot_sigma_mgon=[0, 1, 50]))

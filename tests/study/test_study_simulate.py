@@ -19,7 +19,7 @@ from accelstudy.files.tables import git_commit, read_origin, read_table, write_t
 from accelstudy.study import tables as module
 from accelstudy.study.cell import memory
 from accelstudy.study.replicates import ESTIMATES
-from accelstudy.study.statistics import simulated_statistics
+from accelstudy.study.statistics import statistics
 from accelstudy.study.tables import collect, read_estimates
 
 GRAVITY, ROBOT = f"{NINE}/mclaren-24/gravity", f"{NINE}/mclaren-24/robot"
@@ -158,9 +158,9 @@ def test_nothing_is_left_of_an_interrupted_job(monkeypatch, tmp_path):
         calls.append(cell.name)
         if len(calls) == 2:
             raise KeyboardInterrupt
-        return simulated_statistics(cell, *which, **more)
+        return statistics(cell, *which, **more)
 
-    monkeypatch.setattr(module, "simulated_statistics", broken)
+    monkeypatch.setattr(module, "statistics", broken)
     with pytest.raises(KeyboardInterrupt):
         simulate_cells(tmp_path, make_cells(grid()).values())
     assert calls == [GRAVITY, ROBOT]

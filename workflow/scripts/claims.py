@@ -1,12 +1,13 @@
+from accelstudy.files.outputs import whole_file
+from accelstudy.files.tables import read_table, write_table
 from accelstudy.jobs import job
-from accelstudy.study.claims.verdicts import TABLES, judge_claims
+from accelstudy.study.claims.page import claims_page
+from accelstudy.study.claims.quantities import ClaimData
+from accelstudy.study.claims.verdicts import judge
 from accelstudy.study.config import Study
 
-with job(snakemake) as provenance:
-    study = Study.model_validate(snakemake.config)
-    judge_claims(
-        study,
-        {name: snakemake.input[name] for name in TABLES},
-        dict(snakemake.output.items()),
-        provenance,
-    )
+with job(snakemake) as provenance, whole_file(snakemake.output.html) as path:
+    tables = {name: read_table(table) for name, table in snakemake.input.items()}
+    claims = judge(ClaimData(Study.model_validate(snakemake.config), tables))
+    write_table(snakemake.output.claims, claims, provenance)
+    path.write_text(claims_page(claims), encoding="utf-8")

@@ -94,10 +94,10 @@ def sd_of_tilt(
     rng = np.random.default_rng(np.random.SeedSequence([study.seed, 31]))
     attitude = np.array([at_roll, at_pitch]) * GON
     force = np.array(specific_force(attitude[0], attitude[1], study.gravity_mps2))
-    errors = noise * study.sigma_force * rng.standard_normal((DRAWS, 3))
+    errors = noise * study.noise.sensor.sigma_mps2 * rng.standard_normal((DRAWS, 3))
     angles = (angles_of(force + errors) - attitude) / MGON
     sd = float(np.std(angles[:, ("roll", "pitch").index(angle)], ddof=1))
-    theory = study.sigma_force / study.gravity_mps2 / MGON
+    theory = study.noise.sensor.sigma_mps2 / study.gravity_mps2 / MGON
     return estimate(sd, Z95 * sd / np.sqrt(2 * DRAWS), theory=theory)
 
 
@@ -118,7 +118,7 @@ def effect_of_force(data: ClaimData, force: str, at_roll: float) -> Numbers:
     table = table[at & (table["analysis"] == "forces")]
     if table.empty:  # not on the grid of the study
         samples = settings.base_samples, study.seed
-        noise, g = study.sigma_force, study.gravity_mps2
+        noise, g = study.noise.sensor.sigma_mps2, study.gravity_mps2
         table = leveling_sensitivity([at_roll], [0], noise, *samples, g=g)
     return _largest(table[(table["output"] == "roll") & (table["input"] == force)])
 

@@ -4,46 +4,17 @@ from __future__ import annotations
 
 import re
 from collections.abc import Mapping
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pandas as pd
 
-from accelstudy.files.outputs import whole_file
-from accelstudy.files.tables import read_table, write_table
 from accelstudy.study.claims import quantities
-from accelstudy.study.claims.page import claims_page
 from accelstudy.study.claims.quantities import ClaimData, Numbers, claim_table
-from accelstudy.study.config import Study
 
 REPRODUCED, NOT_REPRODUCED, SLIP = "reproduced", "not reproduced", "slip in the paper"
 
-TABLES = ("cells", "summary", "correlations", "sensitivity", "shapley")
-"""What the claims are judged by."""
 SINGLE = ("single_low", "single_high", "percentile")
-
-
-def judge_claims(
-    study: Study,
-    tables: Mapping[str, str | Path],
-    outputs: Mapping[str, str],
-    provenance: Mapping[str, Any],
-) -> None:
-    """Judge the paper's claims.
-
-    Parameters
-    ----------
-    study : Study, with `sensitivity`
-    tables : paths of the tables of `TABLES`, by their names
-    outputs : paths of `claims` and `html`
-    provenance : see `accelstudy.files.tables.origin`
-    """
-    data = ClaimData(study, {name: read_table(tables[name]) for name in TABLES})
-    claims = judge(data)
-    write_table(outputs["claims"], claims, provenance)
-    with whole_file(outputs["html"]) as path:
-        path.write_text(claims_page(claims), encoding="utf-8")
 
 
 def judge(data: ClaimData) -> pd.DataFrame:

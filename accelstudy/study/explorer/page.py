@@ -10,14 +10,11 @@ import base64
 from collections.abc import Mapping
 from importlib.metadata import version
 from importlib.resources import files
-from pathlib import Path
 
 import pandas as pd
 
-from accelstudy.basics.units import angles_in
 from accelstudy.basics.wording import comma_list, plural
 from accelstudy.files.cache import cached
-from accelstudy.files.outputs import whole_file
 from accelstudy.pages import render
 from accelstudy.study.config import Study
 from accelstudy.study.explorer.charts import explorer_charts
@@ -43,23 +40,14 @@ PANES = {
 """Of the panes by which it is filtered."""
 
 
-def write_explorer(study: Study, tables: Mapping[str, pd.DataFrame], output: str | Path) -> None:
-    """Write the explorer of a study.
+def explorer_page(study: Study, tables: Mapping[str, pd.DataFrame]) -> str:
+    """Return the explorer of a study, in the unit of angles that holds.
 
     Parameters
     ----------
     study : Study
     tables : mapping of name to DataFrame: cells, summary, leveling and quantiles
-    output : path of the page
     """
-    with angles_in(study.angle_unit):
-        page = explorer_page(study, tables)
-    with whole_file(output) as path:
-        path.write_text(page, encoding="utf-8")
-
-
-def explorer_page(study: Study, tables: Mapping[str, pd.DataFrame]) -> str:
-    """Return the page; parameters as in `write_explorer`."""
     cells = tables["cells"]
     rows, titles = setups(cells, tables)
     names = ["model", "scheme", "n", *(factor.name for factor in NOISES)]

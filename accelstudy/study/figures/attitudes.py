@@ -34,7 +34,8 @@ def accuracy_over_attitude(tables: Tables, study: Study) -> Figure:
     from matplotlib.ticker import LogLocator
 
     roll, pitch = np.meshgrid(ROLL, PITCH)
-    table = sigma_table(roll.ravel(), pitch.ravel(), study.sigma_force, study.gravity_mps2)
+    noise = study.noise.sensor.sigma_mps2
+    table = sigma_table(roll.ravel(), pitch.ravel(), noise, study.gravity_mps2)
     limits = {"vmin": table["sigma"].min(), "vmax": table["sigma"].max()}
 
     def draw(ax: Axes, rows: DataFrame) -> Image:
@@ -68,7 +69,7 @@ def accuracy_over_noise(tables: Tables, study: Study) -> Figure:
     Both grow linearly; the dots mark the noise of this study. Roll is the less accurate of the two
     because the sensor is pitched.
     """
-    noise, unit = np.linspace(0.0, 5.0, 51) * study.sigma_force, shown_unit("rad")
+    noise, unit = np.linspace(0.0, 5.0, 51) * study.noise.sensor.sigma_mps2, shown_unit("rad")
 
     def draw(ax: Axes, rows: DataFrame) -> None:
         for (angle, its), line in zip(rows.groupby("angle", sort=False), ("-", "--"), strict=True):

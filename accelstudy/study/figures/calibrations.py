@@ -6,7 +6,7 @@ import numpy as np
 
 from accelstudy.drawing import style
 from accelstudy.study.config import APPROACHES
-from accelstudy.study.figures.panels import Image, handle, in_shown_units, panels, points
+from accelstudy.study.figures.panels import Image, fields, handle, in_shown_units, panels, points
 from accelstudy.study.figures.registry import Axes, DataFrame, Figure, Study, Tables, register
 
 MIN_WRITTEN = 0.005
@@ -93,7 +93,7 @@ def paper_cells(table: DataFrame, study: Study) -> DataFrame:
     return table.assign(approach=table["cell"].map(cells))
 
 
-@register("figure-8", "correlations", category="Paper", angles=False)
+@register("figure-8", "correlations", category="Paper")
 def correlations_of_parameters(tables: Tables, study: Study) -> Figure:
     """Figure 8: correlations of the parameters of the two calibrations.
 
@@ -103,20 +103,15 @@ def correlations_of_parameters(tables: Tables, study: Study) -> Figure:
     correlated, and the robot all but removes that.
     """
     table = correlation_table(tables, study)
-    names = list(table["parameter_1"].unique())
-    symbols, groups = [style.symbol(n) for n in names], np.array([style.group_of(n) for n in names])
+    symbols = {name: style.symbol(name) for name in table["parameter_1"].unique()}
+    groups = np.array([style.group_of(name) for name in symbols])
     edges = np.flatnonzero(groups[1:] != groups[:-1]) + 0.5
-    look: style.Style = {"cmap": "Blues", "vmin": 0, "vmax": max(0.1, table["size"].max())}
+    look: style.Style = {"cmap": "Blues", "vmin": 0, "vmax": max(0.1, table["number"].max())}
 
     def draw(ax: Axes, rows: DataFrame) -> Image:
-        square = rows.pivot_table("size", "parameter_1", "parameter_2", dropna=False)
-        values = square.reindex(index=names, columns=names).to_numpy(float)
-        texts = np.char.lstrip(np.char.mod("%.2f", values), "0")
         for lines in (ax.hlines, ax.vlines):  # between the groups of parameters
-            lines(edges, -0.5, len(names) - 0.5, "#BBBBBB", linewidth=0.6)
-        return style.matrix(
-            ax, symbols, symbols, values, np.where(values > MIN_WRITTEN, texts, ""), **look
-        )
+            lines(edges, -0.5, len(groups) - 0.5, "#BBBBBB", linewidth=0.6)
+        return fields(ax, rows, ("parameter_1", symbols), ("parameter_2", symbols), **look)
 
     return panels(
         table,
@@ -128,8 +123,10 @@ def correlations_of_parameters(tables: Tables, study: Study) -> Figure:
 
 
 def correlation_table(tables: Tables, study: Study) -> DataFrame:
-    """Correlations of the two calibrations: `size` is the absolute value less the identity."""
+    """Correlations of the two calibrations: `number` is the absolute value less the identity."""
     table = paper_cells(tables["correlations"], study).dropna(subset="adjustment")
     identity = table["parameter_1"] == table["parameter_2"]
     titles = table["approach"].map({"gravity": "gravity-based", "robot": "robot-aided"})
-    return table.assign(size=table["adjustment"].abs() - identity, title=titles)
+    number = table["adjustment"].abs() - identity
+    texts = [f"{x:.2f}".lstrip("0") if x > MIN_WRITTEN else "" for x in number]
+    return table.assign(number=number, text=texts, title=titles)

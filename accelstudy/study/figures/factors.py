@@ -79,7 +79,7 @@ def swept(study: Study, factor: Factor) -> DataFrame:
     import pandas as pd
 
     parts = [pd.DataFrame(columns=["cell", "model", "approach", "subject", "held", "x"])]
-    usual = {**study.noise.settings, "sensor_sigma_mps2": study.sigma_force}
+    usual = study.noise.settings
     table = pd.DataFrame([cell.labels for cell in study.cells])
     uses_robot = np.array([cell.conditions.uses_angles for cell in study.cells])
     table = table.assign(

@@ -8,7 +8,7 @@ from accelstudy.basics.units import GON, attitude_unit, shown_unit, to_attitude,
 from accelstudy.drawing import style
 from accelstudy.schemes import get_scheme
 from accelstudy.study.figures.factors import NOISES, varies
-from accelstudy.study.figures.panels import FAILED, Image, handle, panels, tilt_errors
+from accelstudy.study.figures.panels import FAILED, Image, fields, handle, panels, tilt_errors
 from accelstudy.study.figures.registry import Axes, DataFrame, Figure, Study, Tables, register
 
 ROW_MM = 6.0
@@ -31,39 +31,28 @@ def leveling_overview(tables: Tables, study: Study) -> Figure:
     the model, so that a larger model faces a more difficult sensor: compare schemes and approaches
     within a column.
     """
-    cells = tables["cells"][["cell", "scheme", "model", "approach"]]
-    table = tilt_errors(cells, tables["leveling"]).rename(columns={"value": "rms"})
-    schemes = sorted(set(table["scheme"]), key=lambda name: (get_scheme(name).n_positions, name))
-    models = list(table["model"].unique())
-    titles = [get_scheme(name).title for name in schemes], [*map(style.model_title, models)]
-    low, high = table["rms"].agg(["min", "max"]).fillna(1.0)
+    cells = tables["cells"].sort_values(["n_positions", "scheme"])
+    table = tilt_errors(cells, tables["leveling"]).rename(columns={"value": "number"})
+    table["text"] = [_text(*pair) for pair in zip(table["number"], table["both"], strict=True)]
+    schemes = {name: get_scheme(name).title for name in table["scheme"].unique()}
+    models = {name: style.model_title(name) for name in tables["cells"]["model"].unique()}
+    low, high = table["number"].agg(["min", "max"]).fillna(1.0)
     look: style.Style = {"norm": "log", "vmin": low, "vmax": high, "cmap": "YlGnBu"}
 
     def draw(ax: Axes, rows: DataFrame) -> Image:
-        rms, both = (
-            rows.pivot_table(name, "scheme", "model", dropna=False)
-            .reindex(index=schemes, columns=models)
-            .to_numpy(float)
-            for name in ("rms", "both")
-        )
-        failed = rows[rows["rms"].isna()]
-        x, y = failed["model"].map(models.index), failed["scheme"].map(schemes.index)
+        failed = rows[rows["number"].isna()]
+        x, y = failed["model"].map([*models].index), failed["scheme"].map([*schemes].index)
         ax.plot(x, y, color="#999999", **FAILED)
         ax.tick_params(axis="x", rotation=90)
-        return style.matrix(
-            ax, *titles, rms, np.vectorize(_texts)(rms, both), aspect="auto", **look
-        )
+        return fields(ax, rows, ("scheme", schemes), ("model", models), aspect="auto", **look)
 
-    unit, noise = shown_unit("rad"), f"{study.sigma_force * 1e3:.3g} mm/s²"
+    unit, noise = shown_unit("rad"), study.noise.sensor.sigma_mps2
     largest = f"{to_attitude(study.leveling.max_tilt_gon * GON):g} {attitude_unit()}"
-    one_reading = f"{to_display(study.sigma_force / study.gravity_mps2, 'rad'):.1f} {unit}"
-    legend = [
-        handle(
-            "upper number: rms; lower: both stay below in 95 % of the calibrations", linestyle=""
-        ),
-        handle(f"not in it: a single reading, at {noise} and level {one_reading}", linestyle=""),
-        handle("not estimable", **FAILED),
-    ]
+    reading = f"{to_display(noise / study.gravity_mps2, 'rad'):.1f} {unit}"
+    words = (
+        "upper number: rms; lower: both stay below in 95 % of the calibrations",
+        f"not in it: a single reading, at {noise * 1e3:.3g} mm/s² and level {reading}",
+    )
     return panels(
         table,
         draw,
@@ -72,11 +61,10 @@ def leveling_overview(tables: Tables, study: Study) -> Figure:
         column="approach",
         title="{group}, {approach}",
         colours=f"tilt error (rms) at tilts up to {largest} / {unit}",
-        legend=legend,
+        legend=[*(handle(each, linestyle="") for each in words), handle("not estimable", **FAILED)],
     )
 
 
-def _texts(*values: float) -> str:
+def _text(*values: float) -> str:
     """Numbers below each other, with one decimal below 100."""
-    known = [value for value in values if np.isfinite(value)]
-    return "\n".join(f"{value:.{1 if value < 100 else 0}f}" for value in known)
+    return "\n".join(f"{x:.{1 if x < 100 else 0}f}" for x in values if np.isfinite(x))

@@ -7,7 +7,7 @@ is here: labels, ticks, colour bar and legend, and what stands where there is no
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from typing import TYPE_CHECKING, Any, TypeAlias
 
 import numpy as np
@@ -23,6 +23,7 @@ if TYPE_CHECKING:
 
 Image: TypeAlias = "matplotlib.cm.ScalarMappable"
 Line: TypeAlias = "matplotlib.lines.Line2D"
+Titles: TypeAlias = Mapping[str, str]
 
 MAX_PANELS = 12
 """Most rows and most columns of panels; with more none could be read."""
@@ -209,6 +210,23 @@ def points(ax: Axes, rows: DataFrame, x: str = "x", y: str = "y", **look: Any) -
         colour, marker = style.approach_colour(str(approach)), style.approach_marker(str(approach))
         usual = {"color": colour, "marker": marker, "linestyle": ""}
         ax.plot(its[x].to_numpy(), its[y].to_numpy(), **{**usual, **look})
+
+
+def fields(
+    ax: Axes, rows: DataFrame, down: tuple[str, Titles], right: tuple[str, Titles], **look: Any
+) -> Image:
+    """Draw a field for each row, with its `text`, in the colour of its `number`; none for NaN.
+
+    `down` and `right` are the columns that choose the place, with titles of their values in order.
+    """
+    import pandas as pd
+
+    places = pd.MultiIndex.from_product([down[1], right[1]])
+    table = rows.groupby([down[0], right[0]])[["number", "text"]].first().reindex(places)
+    shape = len(down[1]), len(right[1])
+    numbers, texts = table["number"].to_numpy(float), table["text"].fillna("").to_numpy(str)
+    titles = [*down[1].values()], [*right[1].values()]
+    return style.matrix(ax, *titles, numbers.reshape(shape), texts.reshape(shape), **look)
 
 
 def line_looks(names: Iterable[str], **look: Any) -> dict[str, style.Style]:

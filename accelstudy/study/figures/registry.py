@@ -43,7 +43,6 @@ class FigureEntry:
     category : str, heading under which a report lists it
     tables : tuple of str, names of the tables of the study that it draws
     when : callable, whether a study has this figure
-    angles : bool, whether it shows angles; then the caption explains their unit
     """
 
     name: str
@@ -53,7 +52,6 @@ class FigureEntry:
     category: str
     tables: tuple[str, ...]
     when: Callable[[Study], bool]
-    angles: bool
 
 
 def register(
@@ -61,7 +59,6 @@ def register(
     *tables: str,
     category: str = "Study",
     when: Callable[[Study], bool] | None = None,
-    angles: bool = True,
     **settings: Any,
 ) -> Callable[[Draw], Draw]:
     """Register the function that draws a figure; parameters as in `FigureEntry`.
@@ -77,9 +74,7 @@ def register(
         title, _, caption = text.partition(".\n\n")
         has_it = when or (lambda study: category != "Paper" or study.paper)
         drawn = partial(draw, **settings)
-        _REGISTRY.add(
-            name, FigureEntry(name, title, caption, drawn, category, tables, has_it, angles)
-        )
+        _REGISTRY.add(name, FigureEntry(name, title, caption, drawn, category, tables, has_it))
         return draw
 
     return decorate
@@ -98,9 +93,8 @@ def figure_names(study: Study | None = None) -> tuple[str, ...]:
 
 def caption(name: str, study: Study) -> str:
     """Caption of a figure, with the unit of angles in this study."""
-    figure = get_figure(name)
     with angles_in(study.angle_unit):
-        return f"{figure.caption}\n{angle_note()}." if figure.angles else figure.caption
+        return f"{get_figure(name).caption}\n{angle_note()}."
 
 
 def draw(name: str, tables: Tables, study: Study) -> Figure:
@@ -124,13 +118,9 @@ def write_figure(name: str, tables: Tables, study: Study, path: str | Path) -> N
     """Draw a figure, and write it as SVG or PNG, by the ending of the path.
 
     The file is whole or not there at all, and the same tables give the same bytes. Parameters as in
-    `draw`; an error that arises names the figure.
+    `draw`.
     """
     from accelstudy.drawing.saving import save
     from accelstudy.drawing.style import DPI
 
-    try:
-        save(draw(name, tables, study), path, get_figure(name).title, DPI)
-    except Exception as error:
-        error.add_note(f"The figure {name!r} could not be drawn.")
-        raise
+    save(draw(name, tables, study), path, get_figure(name).title, DPI)
