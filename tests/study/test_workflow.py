@@ -128,7 +128,7 @@ def test_all_is_made(single):
         *SET_UPS
     }
     logs = [(results / "logs" / "simulate" / f"{name}.log").read_text() for name in SET_UPS]
-    assert sum(log.count(" replicates, ") for log in logs) == 7
+    assert sum(log.count(" replicates converged") for log in logs) == 7
     (said, *_) = sorted((single / ".snakemake" / "log").iterdir())
     assert "localrule" not in said.read_text()  # each rule has a message
     assert remains(single) == []
