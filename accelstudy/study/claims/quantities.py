@@ -8,13 +8,11 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from functools import cache, cached_property
-from pathlib import Path
+from functools import cached_property
 from typing import Any
 
 import numpy as np
 import pandas as pd
-import yaml
 from numpy.typing import NDArray
 from scipy import special
 
@@ -32,13 +30,6 @@ Numbers = dict[str, Any]
 DRAWS = 200_000
 TILT = 50.0
 """Largest roll and pitch, in gon, of the attitudes over which shares are judged."""
-
-
-@cache
-def claim_table() -> list[dict[str, Any]]:
-    """Read the claims."""
-    text = Path(__file__).with_name("claims.yaml").read_text(encoding="utf-8")
-    return list(yaml.safe_load(text))
 
 
 @dataclass(frozen=True)

@@ -4,17 +4,27 @@ from __future__ import annotations
 
 import re
 from collections.abc import Mapping
+from functools import cache
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pandas as pd
+import yaml
 
 from accelstudy.study.claims import quantities
-from accelstudy.study.claims.quantities import ClaimData, Numbers, claim_table
+from accelstudy.study.claims.quantities import ClaimData, Numbers
 
 REPRODUCED, NOT_REPRODUCED, SLIP = "reproduced", "not reproduced", "slip in the paper"
 
 SINGLE = ("single_low", "single_high", "percentile")
+
+
+@cache
+def claim_table() -> list[dict[str, Any]]:
+    """Read the claims."""
+    text = Path(__file__).with_name("claims.yaml").read_text(encoding="utf-8")
+    return list(yaml.safe_load(text))
 
 
 def judge(data: ClaimData) -> pd.DataFrame:
