@@ -6,8 +6,7 @@ from pathlib import Path
 
 import pandas as pd
 
-from accelstudy.study.claims.quantities import ClaimData
-from accelstudy.study.claims.verdicts import judge
+from accelstudy.study.claims.verdicts import ClaimData, judge
 from accelstudy.study.config import read_study
 from accelstudy.study.sensitivity import sensitivity_table, shapley_table
 from accelstudy.study.tables import simulated_tables

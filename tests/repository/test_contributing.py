@@ -12,8 +12,7 @@ from places import ROOT
 from plugin_helpers import forgotten
 
 from accelstudy.basics import plugins
-from accelstudy.study.claims.quantities import ClaimData
-from accelstudy.study.claims.verdicts import judge_claim
+from accelstudy.study.claims.verdicts import ClaimData, judge_claim
 from accelstudy.study.config import read_study
 from accelstudy.study.figures import caption, draw, figure_names, get_figure
 

@@ -17,10 +17,11 @@ from accelstudy.leveling.sensitivity import leveling_sensitivity
 from accelstudy.sensors.models import get_model
 from accelstudy.study.claims import quantities
 from accelstudy.study.claims.page import claims_markdown, claims_page
-from accelstudy.study.claims.quantities import ClaimData, single_reductions
+from accelstudy.study.claims.quantities import single_reductions
 from accelstudy.study.claims.verdicts import (
     NOT_REPRODUCED,
     REPRODUCED,
+    ClaimData,
     claim_table,
     judge,
     judge_claim,

@@ -2,8 +2,7 @@ from accelstudy.files.outputs import whole_file
 from accelstudy.files.tables import read_table, write_table
 from accelstudy.jobs import job
 from accelstudy.study.claims.page import claims_page
-from accelstudy.study.claims.quantities import ClaimData
-from accelstudy.study.claims.verdicts import judge
+from accelstudy.study.claims.verdicts import ClaimData, judge
 from accelstudy.study.config import Study
 
 with job(snakemake) as provenance, whole_file(snakemake.output.html) as path:

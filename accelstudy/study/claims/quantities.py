@@ -6,10 +6,8 @@ claim, and further numbers that its rule or its sentence uses.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
-from functools import cached_property
-from typing import Any
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import pandas as pd
@@ -22,7 +20,10 @@ from accelstudy.effects import get_effect
 from accelstudy.leveling.angles import angles_of, specific_force
 from accelstudy.leveling.sensitivity import leveling_sensitivity
 from accelstudy.leveling.shares import order_changes
-from accelstudy.study.config import APPROACHES, SensitivityConfig, Study
+from accelstudy.study.config import APPROACHES
+
+if TYPE_CHECKING:
+    from accelstudy.study.claims.verdicts import ClaimData
 
 Array = NDArray[np.float64]
 Numbers = dict[str, Any]
@@ -30,39 +31,6 @@ Numbers = dict[str, Any]
 DRAWS = 200_000
 TILT = 50.0
 """Largest roll and pitch, in gon, of the attitudes over which shares are judged."""
-
-
-@dataclass(frozen=True)
-class ClaimData:
-    """What the claims are judged by.
-
-    Attributes
-    ----------
-    study : Study, with `sensitivity`
-    tables : mapping of name to DataFrame: cells, summary, correlations, sensitivity and shapley
-    """
-
-    study: Study
-    tables: Mapping[str, pd.DataFrame]
-
-    @property
-    def settings(self) -> SensitivityConfig:
-        """Settings of the sensitivity analysis: its model and scheme are those of the claims."""
-        assert self.study.sensitivity is not None
-        return self.study.sensitivity
-
-    @cached_property
-    def schemes(self) -> list[str]:
-        """Schemes in which both approaches were simulated with the model of the claims."""
-        cells = self.tables["cells"]
-        done = set(cells["cell"][cells["estimable"].astype(bool) & (cells["n_replicates"] > 0)])
-        names = dict.fromkeys(cells["scheme"].astype(str))
-        return [s for s in names if all(self.settings.cell(a, s) in done for a in APPROACHES)]
-
-    def rows(self, table: str, approach: str, scheme: str = "") -> pd.DataFrame:
-        """Rows of a table that are of one cell."""
-        rows = self.tables[table]
-        return rows[rows["cell"] == self.settings.cell(approach, scheme)]
 
 
 def estimate(value: float, half: float, **others: Any) -> Numbers:

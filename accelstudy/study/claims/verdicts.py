@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import re
 from collections.abc import Mapping
-from functools import cache
+from dataclasses import dataclass
+from functools import cache, cached_property
 from pathlib import Path
 from typing import Any
 
@@ -13,11 +14,45 @@ import pandas as pd
 import yaml
 
 from accelstudy.study.claims import quantities
-from accelstudy.study.claims.quantities import ClaimData, Numbers
+from accelstudy.study.claims.quantities import Numbers
+from accelstudy.study.config import APPROACHES, SensitivityConfig, Study
 
 REPRODUCED, NOT_REPRODUCED, SLIP = "reproduced", "not reproduced", "slip in the paper"
 
 SINGLE = ("single_low", "single_high", "percentile")
+
+
+@dataclass(frozen=True)
+class ClaimData:
+    """What the claims are judged by.
+
+    Attributes
+    ----------
+    study : Study, with `sensitivity`
+    tables : mapping of name to DataFrame: cells, summary, correlations, sensitivity and shapley
+    """
+
+    study: Study
+    tables: Mapping[str, pd.DataFrame]
+
+    @property
+    def settings(self) -> SensitivityConfig:
+        """Settings of the sensitivity analysis: its model and scheme are those of the claims."""
+        assert self.study.sensitivity is not None
+        return self.study.sensitivity
+
+    @cached_property
+    def schemes(self) -> list[str]:
+        """Schemes in which both approaches were simulated with the model of the claims."""
+        cells = self.tables["cells"]
+        done = set(cells["cell"][cells["estimable"].astype(bool) & (cells["n_replicates"] > 0)])
+        names = dict.fromkeys(cells["scheme"].astype(str))
+        return [s for s in names if all(self.settings.cell(a, s) in done for a in APPROACHES)]
+
+    def rows(self, table: str, approach: str, scheme: str = "") -> pd.DataFrame:
+        """Rows of a table that are of one cell."""
+        rows = self.tables[table]
+        return rows[rows["cell"] == self.settings.cell(approach, scheme)]
 
 
 @cache
