@@ -85,13 +85,11 @@ class Odd(Part):
     campaign : its campaign
     posterior : probability that it is odd
     names : effects that it may have
-    reason : in words
     """
 
     campaign: str
     posterior: float
     names: list[str]
-    reason: str
 
 
 class Each(Part):

@@ -23,7 +23,7 @@ from accelstudy.diagnosis.evidence.noise_tests import NOISES
 from accelstudy.diagnosis.rules import RULES
 from accelstudy.lots.evidence import Sensor, SensorEvidence
 from accelstudy.lots.noise import NoisePrior, noises_of_lot
-from accelstudy.lots.passes import LEVEL, ODD, LotEffect, Mapped, Pass, SensorState
+from accelstudy.lots.passes import LEVEL, ODD, Alternative, LotEffect, Mapped, Pass, SensorState
 from accelstudy.lots.sizes import Names
 from accelstudy.sensors.models import compose, composition_name
 from accelstudy.sensors.sensor import SensorModel
@@ -87,7 +87,7 @@ class LotDiagnosis:
         return "no_effect" if not self.missing else "named" if self.effects else "unknown"
 
     @property
-    def alternatives(self) -> list[tuple[Names, float]]:
+    def alternatives(self) -> list[Alternative]:
         """The most probable classes of what has no sure name, with their posterior."""
         return next((one for one in self.passes if one.missing), self.passes[-1]).alternatives
 

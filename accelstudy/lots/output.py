@@ -50,7 +50,7 @@ from accelstudy.leveling.error import (
     tilt_error,
 )
 from accelstudy.lots.evidence import either
-from accelstudy.lots.file_format import LotDocument
+from accelstudy.lots.file_format import LotDocument, Tilt
 from accelstudy.lots.lot import LotDiagnosis, weigh_lot
 from accelstudy.lots.passes import LEVEL, LotEffect
 from accelstudy.lots.type_file import TypeParameter, write_type
@@ -75,7 +75,8 @@ class Lot(Result):
     ----------
     diagnosis : accelstudy.lots.lot.LotDiagnosis, all that is missing
     model : SensorModel, that was diagnosed, without what was found
-    fits : calibrations of the sensors with the model of the type, or why there is none
+    fits : mapping of the numbers of sensors to calibrations with the model of the type
+    failed : mapping of campaigns to why they have none
     left_out : mapping of campaigns that are not in the lot to why
     """
 
@@ -83,13 +84,14 @@ class Lot(Result):
 
     diagnosis: LotDiagnosis
     model: SensorModel
-    fits: Sequence[CampaignFit | InputError]
+    fits: Mapping[int, CampaignFit]
+    failed: Mapping[str, str]
     left_out: Mapping[str, str]
 
     @property
     def name(self) -> str:  # type: ignore[override]
         """How many sensors there are."""
-        return f"{len(self.fits)} sensors"
+        return f"{len(self.diagnosis.last.sensors)} sensors"
 
     @classmethod
     def of(
@@ -133,38 +135,31 @@ class Lot(Result):
         for name, why in without.items():
             say(f"not in the lot: {name}: {why.removeprefix(f'{name}: ')}")
         diagnosis = weigh_lot(usable, model, approach, seed, cores)
-        fits = list[CampaignFit | InputError]()
+        fits, failed = dict[int, CampaignFit](), dict[str, str]()
         for i, sensor in enumerate(diagnosis.last.sensors):
             try:
-                fits.append(fit_campaign(sensor.campaign, diagnosis.model_of(i), sensor.approach))
+                fits[i] = fit_campaign(sensor.campaign, diagnosis.model_of(i), sensor.approach)
             except InputError as error:
-                fits.append(error)
-        return cls(diagnosis, model, fits, without)
-
-    @cached_property
-    def fitted(self) -> dict[int, CampaignFit]:
-        """Calibrations of the sensors by their numbers, without those of which there is none."""
-        each = enumerate(self.fits)
-        return {i: fit for i, fit in each if isinstance(fit, CampaignFit)}
+                failed[sensor.campaign.name] = str(error)
+        return cls(diagnosis, model, fits, failed, without)
 
     @property
     def usual(self) -> dict[int, CampaignFit]:
         """Calibrations of the sensors that are not odd, by their numbers."""
-        return {i: self.fitted[i] for i in self.diagnosis.last.usual if i in self.fitted}
+        return {i: self.fits[i] for i in self.diagnosis.last.usual if i in self.fits}
 
     @property
     def calibrations(self) -> dict[str, Calibration]:
         """Calibration of each sensor with all that the model lacks, by its campaign."""
-        fits = self.fitted.values()
-        return {fit.campaign.name: Calibration(fit) for fit in fits}
+        return {fit.campaign.name: Calibration(fit) for fit in self.fits.values()}
 
     @cached_property
     def parameters(self) -> dict[str, TypeParameter]:
         """Parameters of the model of the type; of an effect, over the sensors that have it."""
-        diagnosis, n = self.diagnosis, len(self.fits)
+        diagnosis, n = self.diagnosis, len(self.diagnosis.last.sensors)
         model, each = diagnosis.model, diagnosis.each
         values, sigmas = np.full((2, n, model.n_parameters), np.nan)
-        for i, fit in self.fitted.items():
+        for i, fit in self.fits.items():
             values[i], sigmas[i] = fit.parameters, np.sqrt(self._variances(i, fit))
         usual = np.isin(np.arange(n), diagnosis.last.usual)
         having = {
@@ -197,8 +192,8 @@ class Lot(Result):
         return own * float((r + noise.freedom * ratio) / (r + noise.freedom))
 
     @cached_property
-    def tilt(self) -> Array | None:
-        """Rms tilt error of the sensors by what their model lacked, (2,), rad: roll and pitch.
+    def tilt(self) -> Tilt | None:
+        """Rms tilt error of the sensors by what their model lacked.
 
         It is over tilts up to `MAX_TILT_GON`, in the conditions of the campaigns, of sensors that
         are not odd, and without what the uncertainty of the parameters adds. None if nothing of the
@@ -209,7 +204,10 @@ class Lot(Result):
             for fit in self.usual.values():
                 with suppress(InputError):
                     squares.append(_squared_error(fit, self.model))
-        return np.sqrt(np.maximum(np.mean(squares, axis=0), 0.0)) if squares else None
+        if not squares:
+            return None
+        roll, pitch = np.sqrt(np.maximum(np.mean(squares, axis=0), 0.0)) / MGON
+        return Tilt(roll_mgon=roll, pitch_mgon=pitch, max_tilt_gon=MAX_TILT_GON)
 
     @property
     def state(self) -> str:
@@ -237,29 +235,18 @@ class Lot(Result):
     @cached_property
     def content(self) -> dict[str, Any]:
         """Content of lot.json, in SI."""
-        d, tilt = self.diagnosis, self.tilt
+        d = self.diagnosis
         return LotDocument.content({
             "sensors": len(d.last.sensors),
             "anything": {"p_value": d.p_value, "missing": d.missing, "level": LEVEL},
-            "effects": [
-                {**found._asdict(), "parameters": self._sizes(found)} for found in d.effects
-            ],
+            "effects": [{**one._asdict(), "parameters": self._sizes(one)} for one in d.effects],
             "explained": d.explained,
             "close": d.close,
-            "alternatives": [{"names": n, "posterior": p} for n, p in d.alternatives],
-            "odd": [
-                {**one._asdict(), "reason": f"it shows {either(one.names)}, and the others do not"}
-                for one in d.last.odd
-            ],
-            "each": [
-                {**one._asdict(), "failed": str(fit) if isinstance(fit, InputError) else None}
-                for one, fit in zip(d.each, self.fits, strict=True)
-            ],
+            "alternatives": d.alternatives,
+            "odd": d.last.odd,
+            "each": [{**one._asdict(), "failed": self.failed.get(one.campaign)} for one in d.each],
             "left_out": [{"campaign": name, "reason": why} for name, why in self.left_out.items()],
-            "tilt": None if tilt is None else {
-                "roll_mgon": tilt[0] / MGON, "pitch_mgon": tilt[1] / MGON,
-                "max_tilt_gon": MAX_TILT_GON,
-            },
+            "tilt": self.tilt,
             "verdict": " ".join(self.sentences),
         })  # fmt: skip
 
@@ -285,7 +272,7 @@ class Lot(Result):
 
     def write(self, folder: Path, place: Path) -> None:
         """Write what `accelstudy lot` does."""
-        for i, fit in self.fitted.items():
+        for i, fit in self.fits.items():
             its_own = folder / EACH / f"{i + 1:04d}-{path_name(fit.campaign.name, 'sensor')}"
             its_own.mkdir(parents=True)
             CalibrationDocument.write(its_own, Calibration(fit).content)

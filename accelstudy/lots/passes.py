@@ -81,6 +81,13 @@ class LotEffect(NamedTuple):
     spec: str | None = None
 
 
+class Alternative(NamedTuple):
+    """Names that mean the same in a lot, and how probable it is that the model lacks one."""
+
+    names: tuple[str, ...]
+    posterior: float
+
+
 class SensorState(NamedTuple):
     """What the model lacks for a sensor, or what makes it odd, and how probable that is."""
 
@@ -253,9 +260,9 @@ class Pass:
         return max(1, MAX_ODD_SHARE * len(self.sensors))
 
     @property
-    def alternatives(self) -> list[tuple[tuple[str, ...], float]]:
+    def alternatives(self) -> list[Alternative]:
         """The most probable classes with their posterior, given that anything is wrong."""
-        return [(self.classes[name], given) for name, given in [*self.given.items()][:3]]
+        return [Alternative(self.classes[name], p) for name, p in [*self.given.items()][:3]]
 
     @cached_property
     def odd(self) -> list[SensorState]:

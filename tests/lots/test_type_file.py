@@ -43,13 +43,13 @@ def fitted(campaign):
 
 def type_of(sensors, folder):
     """The file of a type of which nothing is missing and no sensor is odd."""
-    fits = [fitted(one) for one in sensors]
+    fits = {i: fitted(one) for i, one in enumerate(sensors)}
     named = [SimpleNamespace(noise=NoisePrior(0.002, 200.0)) for _ in sensors]
     lot = SimpleNamespace(
         last=SimpleNamespace(usual=range(len(sensors)), sensors=named),
         each=(), effects=(), model=MODEL,
     )  # fmt: skip
-    assert write_type(Lot(lot, MODEL, fits, {}), folder)
+    assert write_type(Lot(lot, MODEL, fits, {}, {}), folder)
     return folder / "type.yaml"
 
 

@@ -129,7 +129,7 @@ def _lot():
     sensors = (SimpleNamespace(noise=None),) * len(each)
     one, model = Pass(sensors, tuple(each)), get_model("bias-scale")
     lot = LotDiagnosis((one, one), model, tuple(one.found))
-    return Lot(lot, model, [None] * 3, {}).content
+    return Lot(lot, model, {}, {}, {}).content
 
 
 def test_the_reference_says_what_the_kinds_of_keywords_mean():
