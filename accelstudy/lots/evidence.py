@@ -14,7 +14,6 @@ from accelstudy.basics.wording import comma_list, words
 from accelstudy.campaign.session import Campaign
 from accelstudy.diagnosis.decision.problem import BaseFit, Problem, fit_base, pose
 from accelstudy.diagnosis.evidence.candidates import UNKNOWN
-from accelstudy.diagnosis.evidence.detection import Chance
 from accelstudy.diagnosis.evidence.noise_tests import LEVEL as LEVEL_OF_NOISE
 from accelstudy.diagnosis.evidence.sets import weigh_sets
 from accelstudy.diagnosis.evidence.size import Evidence, Level
@@ -35,8 +34,6 @@ MAX_DIRECTION_DIFFERENCE = 0.15
 """Largest difference of the directions of forces in positions that are the same."""
 MIN_VARIANCE = 1e-12
 """Least variance of unit weight that is divided by."""
-DRAWS = 1000
-"""Number of simulated sets of residuals without any effect, for each campaign."""
 
 
 @dataclass(frozen=True)
@@ -53,7 +50,6 @@ class SensorEvidence:
     classes : tuple of tuple of str, names that mean the same in this campaign
     specs : dict of effect to its best setting
     shapes : dict of lasting effects that show to their shapes
-    tested : dict of what is tested to its log odds and, behind that, those in noise alone, (1 + s,)
     base : BaseFit, of the campaign; None where it does not determine the model
     """
 
@@ -64,7 +60,6 @@ class SensorEvidence:
     classes: tuple[tuple[str, ...], ...] = ()
     specs: dict[str, str] = field(default_factory=dict)
     shapes: dict[str, tuple[str, ...]] = field(default_factory=dict)
-    tested: dict[str, NDArray[np.float32]] = field(default_factory=dict)
     base: BaseFit | None = None
 
     @cached_property
@@ -119,7 +114,7 @@ class Sensor:
 def _weighed(sensor: Sensor) -> SensorEvidence:
     noise = sensor.noise
     problem = pose(sensor.fit(), np.random.SeedSequence(sensor.seed))
-    detection, singles, chance = problem.detection, problem.singles, problem.chance
+    detection, singles = problem.detection, problem.singles
     residuals, evidence = problem.residuals, problem.evidence
     square = float(residuals.z @ residuals.z)
     # A sensor with a noise of its own is no usual one.
@@ -137,8 +132,6 @@ def _weighed(sensor: Sensor) -> SensorEvidence:
         one, other = sorted(shape.name if shape.place is None else "" for shape in pair.best)
         if one:
             pairs[one, other] = pair.log_density - nothing
-    observed = [detection.densities[name] - nothing for name in problem.field.names]
-    odds = np.vstack([observed, _by_chance(problem, chance, noise)]).astype(np.float32)
     return SensorEvidence(
         campaign=sensor.campaign.name,
         p_value=detection.p_value,
@@ -152,26 +145,8 @@ def _weighed(sensor: Sensor) -> SensorEvidence:
             if (effects := [h.effect for h in shapes.hypotheses if h.place is None])
             and not effects[0].sudden
         },
-        tested=dict(zip(problem.field.names, odds.T, strict=True)),
         base=problem.base,
     )
-
-
-def _by_chance(problem: Problem, chance: Chance, noise: NoisePrior | None) -> Array:
-    """Log odds of what is tested in noise alone, whose level is that of a sensor of the lot."""
-    field, evidence = problem.field, problem.evidence
-    of_levels = np.random.SeedSequence(chance.seed.entropy, spawn_key=(*chance.seed.spawn_key, 1))
-    rng = np.random.default_rng(of_levels)
-
-    def odds(errors: Array) -> Array:
-        if noise is not None:
-            half = noise.freedom / 2
-            errors = errors * np.sqrt(half / rng.gamma(half, size=(len(errors), 1)))
-        return field.odds(evidence, field.project(errors))
-
-    if not field.names:
-        return np.zeros((DRAWS, 0))
-    return odds(chance.errors(problem.residuals))
 
 
 def pose_mean(sensors: Sequence[Sensor], said: Sequence[SensorEvidence]) -> Problem | None:

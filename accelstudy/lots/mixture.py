@@ -18,7 +18,7 @@ sensors, it has the odds of their mean.
 
 from __future__ import annotations
 
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Collection, Mapping
 from dataclasses import dataclass, field
 from functools import cache, cached_property
 from itertools import combinations, product
@@ -253,32 +253,3 @@ class Mixture:
             alone = special.logsumexp(logs) - np.log(prior)
             logs = logs + special.logsumexp([0.0, same - alone], b=[1 - PRIOR_ALIKE, PRIOR_ALIKE])
         return EffectSet(names, each, logs)
-
-
-def p_value(
-    tested: Sequence[Mapping[str, NDArray[np.float32]]], weights: Mapping[str, float]
-) -> float:
-    """Probability that sensors without anything missing would show as much evidence.
-
-    The statistic is the evidence that a share of the sensors has one effect. Lots of simulated
-    noise say how large it is if nothing is missing.
-
-    Parameters
-    ----------
-    tested : of each sensor, what is tested with its log odds and those in noise alone, (1 + s,)
-    weights : prior weights of what shares none with the others, relative to all of these
-    """
-    names = sorted({name for sensor in tested for name in sensor})
-    if not names:
-        return 1.0
-    nodes, prior = _share_nodes(NODES[2])
-    with np.errstate(divide="ignore"):
-        has, lacks = np.log(nodes), np.log1p(-nodes)
-    by_effect = list[Array]()
-    for name in names:
-        each = (sensor[name][:, None] for sensor in tested if name in sensor)
-        logs = sum(np.logaddexp(lacks, odds + has) for odds in each)
-        weight = weights.get(name, 1 / len(names))
-        by_effect.append(special.logsumexp(logs + np.log(prior * weight), axis=-1))
-    total = special.logsumexp(by_effect, axis=0)
-    return float((1 + np.sum(total[1:] >= total[0])) / len(total))

@@ -10,6 +10,7 @@ from typing import Any, NamedTuple, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy import stats
 
 from accelstudy.basics.progress import track
 from accelstudy.diagnosis.decision.problem import Problem
@@ -24,8 +25,8 @@ from accelstudy.lots.evidence import (
     pose_mean,
     unknown_odds,
 )
-from accelstudy.lots.mixture import Mixture, p_value
-from accelstudy.lots.sizes import Derivatives, Names, TypeSizes
+from accelstudy.lots.mixture import Mixture
+from accelstudy.lots.sizes import Names, TypeSizes
 
 Array = NDArray[np.float64]
 Mapped: TypeAlias = Callable[..., Iterator[Any]]
@@ -138,11 +139,8 @@ class Pass:
             shapes[name] = [*first, *([refined[name]] if name in refined else [])]
         if not shapes:
             return one
-        specs = [spec for tried in shapes.values() for spec in tried]
-        told = [Derivatives.of(each.frame, specs) for each in one.evidence]
         usual = np.isin(np.arange(len(sensors)), some)
-        redundancy = sum(shown.frame.residuals.redundancy for shown in said if shown.frame)
-        return replace(one, sizes=TypeSizes.of(told, shapes, usual, redundancy))
+        return replace(one, sizes=TypeSizes.of([e.frame for e in one.evidence], shapes, usual))
 
     @cached_property
     def classes(self) -> dict[str, tuple[str, ...]]:
@@ -190,9 +188,15 @@ class Pass:
         return self._p_value([self.evidence[i] for i in self.usual])
 
     def _p_value(self, evidence: Sequence[SensorEvidence]) -> float:
-        """By the sensors or by their mean, if they have one: the smaller one of two."""
-        each = p_value([one.tested for one in evidence], {UNKNOWN: RULES.prior_unknown})
-        return each if self.mean is None else min(2 * min(each, self.mean.detection.p_value), 1.0)
+        """By the sum of what sensors show, the most that one shows, and the mean if they have one.
+
+        Fisher's combination of their p-values finds what many have, Tippett's what a single one
+        has. The smallest of the tests counts for all.
+        """
+        each = [one.p_value for one in evidence]
+        tests = [stats.combine_pvalues(each, how).pvalue for how in ("fisher", "tippett")]
+        tests += [] if self.mean is None else [self.mean.detection.p_value]
+        return float(min(len(tests) * min(tests), 1.0))
 
     @property
     def missing(self) -> bool:

@@ -48,41 +48,6 @@ LIKELIHOOD_TOLERANCE = 1e-3
 """Change of the log likelihood below which the search ends."""
 
 
-class Derivatives(NamedTuple):
-    """What the parameters of effects do to the residuals z of a campaign.
-
-    Attributes
-    ----------
-    columns : dict of effect, with its settings, to (m, k) array, derivatives of z by its parameters
-    squares : dict of the same to (k,) array, of them if no parameter of the model were estimated
-    z : (m,) array, of unit weight
-    """
-
-    columns: Mapping[str, Array]
-    squares: Mapping[str, Array]
-    z: Array
-
-    @classmethod
-    def of(cls, frame: SessionFit | None, specs: Iterable[str]) -> Derivatives:
-        """Evaluate effects in a campaign; what it cannot show is zero.
-
-        Parameters
-        ----------
-        frame : SessionFit, of the campaign; None for one that shows nothing
-        specs : the effects
-        """
-        z = np.zeros(0) if frame is None else frame.residuals.z
-        columns, squares = dict[str, Array](), dict[str, Array]()
-        for spec in specs:
-            effect = get_effect(spec)
-            rows = np.zeros((len(z), len(effect.parameters)))
-            with suppress(InputError):  # a column is absent
-                rows = rows if frame is None else frame.rows(effect)
-            squares[spec] = np.sum(rows**2, axis=0)
-            columns[spec] = rows if frame is None else frame.residuals.project(rows)
-        return cls(columns, squares, z)
-
-
 class TypicalSet(NamedTuple):
     """Sizes of a set of effects that explain a lot best, with one scatter.
 
@@ -124,21 +89,19 @@ class TypeSizes:
     @classmethod
     def of(
         cls,
-        each: Sequence[Derivatives],
+        frames: Sequence[SessionFit | None],
         shapes: Mapping[str, Sequence[str]],
         usual: NDArray[np.bool_],
-        redundancy: int,
     ) -> TypeSizes:
         """Add up what sensors tell, in units of the noise that one or two effects leave.
 
         Parameters
         ----------
-        each : what the parameters of all shapes do to the sensors
+        frames : calibrations of the sensors; None for one that shows nothing and is not usual
         shapes : mapping of effects to their shapes
         usual : as above
-        redundancy : int, of the usual sensors
         """
-        some = [one for one, is_usual in zip(each, usual, strict=True) if is_usual]
+        some = [frame for frame, chosen in zip(frames, usual, strict=True) if frame and chosen]
         specs, turns = dict[str, str](), dict[str, Array]()
         for name, tried in shapes.items():
             parts, turned = zip(*(_shown(some, spec) for spec in tried), strict=True)
@@ -146,15 +109,16 @@ class TypeSizes:
             if turned[best].size:
                 specs[name], turns[name] = tried[best], turned[best]
         effects = np.repeat([*turns], [turn.shape[1] for turn in turns.values()])
-        normal, right = (
-            np.zeros((len(each), *[len(effects)] * 2)),
-            np.zeros((len(each), len(effects))),
-        )
-        for i, one in enumerate(each if turns else ()):
-            a = np.concatenate([one.columns[specs[name]] @ turns[name] for name in turns], axis=1)
-            normal[i], right[i] = a.T @ a, one.z @ a
+        right = np.zeros((len(frames), len(effects)))
+        normal = np.zeros((*right.shape, len(effects)))
+        for i, frame in enumerate(frames if turns else ()):
+            if frame is not None:
+                each = [_derivatives(frame, specs[name])[0] @ turns[name] for name in turns]
+                a = np.concatenate(each, axis=1)
+                normal[i], right[i] = a.T @ a, frame.residuals.z @ a
         raw = cls(specs, effects, normal, right, usual)
-        variance = raw._variance(sum(float(one.z @ one.z) for one in some), redundancy)
+        squares = sum(float(frame.residuals.z @ frame.residuals.z) for frame in some)
+        variance = raw._variance(squares, sum(frame.residuals.redundancy for frame in some))
         return cls(specs, effects, normal / variance, right / variance, usual)
 
     def _variance(self, squares: float, redundancy: int) -> float:
@@ -259,7 +223,22 @@ def most_likely(sets: Sequence[TypicalSet]) -> TypicalSet:
     return max(sets, key=lambda one: one.log_likelihood)
 
 
-def _shown(each: Sequence[Derivatives], spec: str) -> tuple[float, Array]:
+def _derivatives(frame: SessionFit, spec: str) -> tuple[Array, Array]:
+    """What the parameters of an effect do to the residuals z of a campaign.
+
+    Returns
+    -------
+    columns : (m, k) array, derivatives of z; zero for what it cannot show
+    squares : (k,) array, of them if no parameter of the model were estimated
+    """
+    effect, residuals = get_effect(spec), frame.residuals
+    rows = np.zeros((len(residuals.z), len(effect.parameters)))
+    with suppress(InputError):  # a column is absent
+        rows = frame.rows(effect)
+    return residuals.project(rows), np.sum(rows**2, axis=0)
+
+
+def _shown(frames: Sequence[SessionFit], spec: str) -> tuple[float, Array]:
     """How much sensors show of an effect if it is equally large in all, and what of it shows.
 
     Returns
@@ -267,14 +246,15 @@ def _shown(each: Sequence[Derivatives], spec: str) -> tuple[float, Array]:
     part : float, ‖Qᵀz‖² of all residuals as one
     turn : (k, l) array, combinations of its parameters of which sensors tell equally much
     """
-    normal = sum(one.columns[spec].T @ one.columns[spec] for one in each)
-    right = sum(one.z @ one.columns[spec] for one in each)
-    squares = sum(one.squares[spec] for one in each)
-    scale = np.sqrt(np.where(squares > 0, squares, 1.0))
+    columns, squares = zip(*(_derivatives(frame, spec) for frame in frames), strict=True)
+    normal = sum(each.T @ each for each in columns)
+    right = sum(one.residuals.z @ each for one, each in zip(frames, columns, strict=True))
+    total = sum(squares)
+    scale = np.sqrt(np.where(total > 0, total, 1.0))
     values, vectors = np.linalg.eigh(normal / np.outer(scale, scale))
     seen = values > RULES.visible**2
     turn = vectors[:, seen] / scale[:, None] / np.sqrt(values[seen])
-    return float(np.sum((right @ turn) ** 2)), turn * np.sqrt(len(each))
+    return float(np.sum((right @ turn) ** 2)), turn * np.sqrt(len(frames))
 
 
 def _solved(normal: Array, right: Array) -> Array:

@@ -3,12 +3,13 @@
 from dataclasses import replace
 from functools import partial
 from itertools import combinations
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 from scipy import integrate, stats
 
-from accelstudy.diagnosis.evidence.size import SIZE_WEIGHTS, SIZES
+from accelstudy.diagnosis.evidence.size import SIZE_WEIGHTS, SIZES, log_mean
 from accelstudy.lots.evidence import SensorEvidence, lot_classes
 from accelstudy.lots.lot import LotDiagnosis
 from accelstudy.lots.mixture import (
@@ -20,7 +21,7 @@ from accelstudy.lots.mixture import (
     Mixture,
 )
 from accelstudy.lots.passes import LEVEL, MIN_CERTAIN, Pass
-from accelstudy.lots.sizes import SCATTERS, Derivatives, TypeSizes, most_likely, subsets_of
+from accelstudy.lots.sizes import SCATTERS, TypeSizes, most_likely, subsets_of
 from accelstudy.sensors.models import get_model
 
 STANDARD_ERRORS = 3.3
@@ -54,15 +55,15 @@ def mixture_of(odds, **known):
 
 
 def weighed(odds, rng):
-    """A pass over sensors with these odds (n, 3), whose chances are those of their numbers."""
+    """A pass over sensors with these odds (n, 3), which have their p-values by simulation."""
     said = []
     for i, each in enumerate(odds):
         known = dict(zip(NAMES, each.tolist(), strict=True))
         pairs = {(a, b): known[a] + known[b] for a, b in combinations(NAMES, 2)}
         chance = odds_of(rng.standard_normal((CHANCES, len(NAMES))))
-        tested = dict(zip(NAMES, np.vstack([each, chance]).T, strict=True))
-        classes = [(n,) for n in NAMES]
-        said.append(SensorEvidence(f"sensor {i}", 0.5, known, pairs, classes, tested=tested))
+        total, by_chance = log_mean(each), log_mean(chance)
+        p = min((1 + np.sum(by_chance >= total)) / (1 + CHANCES), np.exp(-total))
+        said.append(SensorEvidence(f"sensor {i}", p, known, pairs, [(n,) for n in NAMES]))
     return Pass((None,) * len(said), tuple(said))
 
 
@@ -76,15 +77,14 @@ def type_of(rng, sizes, like=0.0, first=0.0):
     d[..., 1] = first * d[..., 0] + np.sqrt(1 - first**2) * d[..., 1]
     d[..., 2] = like * d[..., 1] + np.sqrt(1 - like**2) * d[..., 2]
     z = np.einsum("nmk,nk->nm", d, sizes) + rng.standard_normal((len(sizes), ROWS))
-    each = [
-        Derivatives(
-            {name: a[:, [k]] for k, name in enumerate(NAMES)},
-            {name: a[:, k] @ a[:, [k]] for k, name in enumerate(NAMES)}, b,
-        )
-        for a, b in zip(d, z, strict=True)
-    ]  # fmt: skip
-    n = len(sizes)
-    return d, z, TypeSizes.of(each, {name: [name] for name in NAMES}, np.full(n, True), n * ROWS)
+    frames = [frame_of(*one) for one in zip(d, z, strict=True)]
+    return d, z, TypeSizes.of(frames, {name: [name] for name in NAMES}, np.full(len(sizes), True))
+
+
+def frame_of(d, z):
+    """A campaign in whose residuals z effects show as columns d, with no parameters."""
+    residuals = SimpleNamespace(z=z, project=lambda rows: rows, redundancy=ROWS)
+    return SimpleNamespace(residuals=residuals, rows=lambda e: d[:, [NAMES.index(e.name)]])
 
 
 def two_effects(rng, like=0.0, first=0.0):
