@@ -67,20 +67,12 @@ def implausible_parameters(effects: Sequence[Effect], parameters: Array, sigma: 
     parameters, sigma : (u,) arrays, SI, in the order of the effects; an unknown sigma (NaN)
         counts as 0
     """
-    doubt = MIN_SIGMAS * np.nan_to_num(np.asarray(sigma, dtype=float), posinf=0.0)
-    values = iter(zip(np.asarray(parameters, dtype=float), doubt, strict=True))
-    descriptions = impossible_parameters(effects, parameters, sigma)
-    for effect in effects:
-        bound = largest(effect)
-        for parameter in effect.parameters:
-            value, uncertain = next(values)
-            if not abs(value) <= bound + uncertain:
-                shown, most = (amount(float(v), parameter.unit) for v in (value, bound))
-                unit = display_unit(parameter.unit)
-                descriptions.append(
-                    f"{parameter.name} = {shown} {unit} (up to ± {most} is believed)"
-                )
-    return descriptions
+    usual = [(-bound, bound) for bound in map(largest, effects)]
+    values = np.nan_to_num(parameters, nan=np.inf)
+    return [
+        *impossible_parameters(effects, parameters, sigma),
+        *_beyond(effects, usual, values, sigma, "up to ± {1} is believed"),
+    ]
 
 
 def impossible_parameters(effects: Sequence[Effect], parameters: Array, sigma: Array) -> list[str]:
@@ -90,18 +82,27 @@ def impossible_parameters(effects: Sequence[Effect], parameters: Array, sigma: A
     ----------
     effects, parameters, sigma : as of `implausible_parameters`
     """
+    bounds = [effect.bounds for effect in effects]
+    return _beyond(effects, bounds, parameters, sigma, "{0} … {1} is possible")
+
+
+def _beyond(
+    effects: Sequence[Effect],
+    bounds: Sequence[tuple[float, float]],
+    parameters: Array,
+    sigma: Array,
+    right: str,
+) -> list[str]:
+    """Describe each parameter beyond the bounds of its effect; `right` says what they allow."""
     values = iter(zip(parameters, MIN_SIGMAS * np.nan_to_num(sigma, posinf=0.0), strict=True))
     descriptions = []
-    for effect in effects:
-        low, high = effect.bounds
+    for effect, (low, high) in zip(effects, bounds, strict=True):
         for parameter in effect.parameters:
             value, uncertain = next(values)
             if value < low - uncertain or value > high + uncertain:
-                shown, least, most = (amount(float(v), parameter.unit) for v in (value, low, high))
-                unit = display_unit(parameter.unit)
-                descriptions.append(
-                    f"{parameter.name} = {shown} {unit} ({least} … {most} is possible)"
-                )
+                shown, *ends = (amount(float(v), parameter.unit) for v in (value, low, high))
+                text = f"{parameter.name} = {shown} {display_unit(parameter.unit)}"
+                descriptions.append(f"{text} ({right.format(*ends)})")
     return descriptions
 
 
