@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping
 from difflib import get_close_matches
 from pathlib import Path
 from typing import Annotated, Any, ClassVar, TypeVar
@@ -18,7 +18,6 @@ from pydantic import (
     model_validator,
 )
 from pydantic import GetJsonSchemaHandler as JsonHandler
-from pydantic.fields import FieldInfo
 from pydantic_core import ErrorDetails, core_schema
 
 from accelstudy.basics import bounds
@@ -144,6 +143,10 @@ WORDS = {
 """What would be right, by the type of pydantic's error; two types have a text of their own."""
 
 
+class KeyProblem(ValueError):
+    """What is wrong with a key of a section, which the message begins with."""
+
+
 class ConfigSection(BaseModel):
     """A part of the configuration; unknown keys are errors."""
 
@@ -153,10 +156,15 @@ class ConfigSection(BaseModel):
 
     @model_validator(mode="before")
     @classmethod
-    def _no_retired_key(cls, content: Any) -> Any:
+    def _check_keys(cls, content: Any) -> Any:
+        known = [field.alias or name for name, field in cls.model_fields.items()]
         for key in content if isinstance(content, Mapping) else ():
             if key in cls.retired:
-                raise ValueError(f"{key}: no longer a key; {cls.retired[key]}")
+                raise KeyProblem(f"{key}: no longer a key; {cls.retired[key]}")
+            if isinstance(key, str) and key not in (*known, *cls.model_fields):
+                near = get_close_matches(key[:100], known, n=1)
+                hint = f"; did you mean {near[0]!r}?" if near else ""
+                raise KeyProblem(f"{key[:100]}: unknown key{hint} (known: {', '.join(known)})")
         return content
 
 
@@ -211,32 +219,25 @@ def validate(
     try:
         return model.model_validate(content)
     except ValidationError as error:
-        text = _first_error(error, content, model, section)
+        text = _first_error(error, content, section)
         for key, name in (names or {}).items():
             if text.startswith((f"{key}: ", f"{key}.")):
                 raise InputError(f"{name}{text.removeprefix(key)}") from None
         raise InputError(f"{source}: {text}") from None
 
 
-def _first_error(
-    error: ValidationError, content: object, root: type[BaseModel], section: str
-) -> str:
-    """Say in one line which key of a `root` is wrong, and what would be right."""
+def _first_error(error: ValidationError, content: object, section: str) -> str:
+    """Say in one line which key of a section is wrong, and what would be right."""
     # Beside a missing key there is often its name with a typo, which says more.
     errors = sorted(error.errors(), key=lambda each: each["type"] == "missing")
     places = [_place(each, content) for each in errors]
     first, place = errors[0], places[0]
     key = ".".join(str(part)[:100] for part in (section, *place) if part != "")
-    if first["type"] == "extra_forbidden":
-        text = f"{key}: unknown key"
-        siblings = _keys_beside(first["loc"], root)
-        near = get_close_matches(str(first["loc"][-1])[:100], siblings, n=1)
-        text += f"; did you mean {near[0]!r}?" if near else ""
-        text += f" (known: {', '.join(siblings)})"
-    elif first["type"] == "value_error":
+    if first["type"] == "value_error":
+        problem = first["ctx"]["error"]
         # The check of a whole section names the key itself.
-        mark = ": " if place else "."
-        text = mark.join(filter(None, [key, str(first["ctx"]["error"])]))
+        mark = "." if isinstance(problem, KeyProblem) or not place else ": "
+        text = mark.join(filter(None, [key, str(problem)]))
     else:
         # Where several kinds of values are right, there is an error for each of them.
         wants = [_wanted(e) for e, p in zip(errors, places, strict=True) if p == place]
@@ -254,7 +255,7 @@ def _place(error: ErrorDetails, content: Any) -> tuple[str | int, ...]:
     for number, part in enumerate(error["loc"], start=1):
         if _has(content, part):
             content = content[part]
-        elif number < len(error["loc"]) or error["type"] not in ("missing", "extra_forbidden"):
+        elif number < len(error["loc"]) or error["type"] != "missing":
             continue
         keys.append(part)
     return tuple(keys)
@@ -274,25 +275,3 @@ def _wanted(error: ErrorDetails) -> str:
     if context.get("min_length") == 1:
         return "must not be empty"
     return WORDS[error["type"]].format(**context)
-
-
-def _keys_beside(location: Sequence[str | int], root: type[BaseModel]) -> list[str]:
-    """Keys that are known in the place of an unknown one."""
-    section = root
-    for part in location[:-1]:
-        field = _keys(section).get(str(part))
-        if field is not None:
-            section = next(_sections(field.annotation), section)
-    return list(_keys(section))
-
-
-def _keys(section: type[BaseModel]) -> dict[str, FieldInfo]:
-    return {field.alias or name: field for name, field in section.model_fields.items()}
-
-
-def _sections(annotation: Any) -> Iterator[type[BaseModel]]:
-    """Sections that occur in an annotation such as `list[Grid] | None`."""
-    if isinstance(annotation, type) and issubclass(annotation, BaseModel):
-        yield annotation
-    for argument in getattr(annotation, "__args__", ()):
-        yield from _sections(argument)
