@@ -15,7 +15,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from accelstudy.basics.units import display_unit, recorded_unit, to_display, to_si, unit_label
 from accelstudy.effects import Parameter, effect_names, get_effect
-from accelstudy.sensors.models import TITLES, compose
+from accelstudy.sensors.models import TITLES
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -94,9 +94,8 @@ GROUPS = {
 # of their cause. These differ from all others for normal and for red-green blind eyes.
 CAUSES = {
     "rig": "#332288",
-    "environment": "#5C0A1E",
-    "history": "#66C2C2",
-    "nonlinearity": "#99CC66",
+    "course": "#5C0A1E",
+    "sensor": "#99CC66",
 }
 
 
@@ -122,15 +121,12 @@ def group_colour(group: str) -> str:
     return CAUSES[cause(group)] if group in effect_names() else "#999999"
 
 
-@cache
 def cause(effect: str) -> str:
-    """Cause of an effect: the part that has it, or what it depends on besides the force."""
-    if get_effect(effect).part == "rig":
+    """Cause of an effect: the rig, the course of time and temperature, or else the sensor alone."""
+    found = get_effect(effect)
+    if found.part == "rig":
         return "rig"
-    columns = set(compose(effect, (effect,)).hold_columns)
-    if columns & {"temperature", "time", "vibration"}:
-        return "environment"
-    return "history" if columns else "nonlinearity"
+    return "course" if found.is_course else "sensor"
 
 
 @cache
@@ -217,15 +213,6 @@ def log_ticks(axis: Axis, low: float, high: float, *, few: bool = False) -> None
     axis.set_major_locator(locator)
     axis.set_major_formatter("{x:g}")
     axis.set_minor_locator(NullLocator())
-
-
-def spread(places: NDArray[np.float64], apart: float) -> list[int]:
-    """Indices of places, from the first on, each at least `apart` from the one chosen before."""
-    chosen: list[int] = []
-    for i, place in enumerate(places):
-        if not chosen or place - places[chosen[-1]] >= apart:
-            chosen.append(i)
-    return chosen
 
 
 def legend_columns(labels: Iterable[str], width: float = FULL) -> int:

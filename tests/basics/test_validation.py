@@ -39,7 +39,8 @@ def test_an_error_is_one_line_with_source_and_key(content, key, said):
 
 def models():
     """All models of what is read from files."""
-    declared = re.compile(r"^class \w+\((ConfigSection|Configuration|Document|Part|\w*Model|\w+Layout)\)", re.M)
+    bases = r"ConfigSection|Configuration|Document|Part|\w*Model|\w+Layout"
+    declared = re.compile(rf"^class \w+\(({bases})\)", re.M)
     for path in (ROOT / "accelstudy").rglob("*.py"):
         if declared.search(path.read_text("utf-8")):
             importlib.import_module(".".join(path.relative_to(ROOT).with_suffix("").parts))

@@ -41,7 +41,7 @@ def draw(figure: Mapping[str, Any], frames: Frames) -> Figure:
             sizes = np.unique(np.concatenate(drawn))
             ax.set(xscale="log", xlabel="noncentrality $\\lambda$")
             # A tick at each size that has room for it.
-            ax.set_xticks(sizes[style.spread(np.log(sizes), APART * len(panels) / 2)])
+            ax.set_xticks(sizes[_spread(np.log(sizes), APART * len(panels) / 2)])
             ax.xaxis.set_major_formatter("{x:g}")
             ax.minorticks_off()
         for handle, label in zip(*ax.get_legend_handles_labels(), strict=True):
@@ -51,6 +51,15 @@ def draw(figure: Mapping[str, Any], frames: Frames) -> Figure:
     columns = style.legend_columns(entries) if entries else 1
     fig.legend([*entries.values()], [*entries], loc="outside lower center", ncols=columns)
     return fig
+
+
+def _spread(places: Any, apart: float) -> list[int]:
+    """Indices of places, from the first on, each at least `apart` from the one chosen before."""
+    chosen: list[int] = []
+    for i, place in enumerate(places):
+        if not chosen or place - places[chosen[-1]] >= apart:
+            chosen.append(i)
+    return chosen
 
 
 def _curve(ax: Axes, rows: pd.DataFrame, curve: Mapping[str, Any], bins: list[float] | None) -> Any:
