@@ -105,16 +105,14 @@ class Batch(Result):
         self.failed: dict[str, str] = {}
         self._chosen = model.name, None if approach is None else approach.name
         for given in track(campaigns, "campaigns"):
-            if isinstance(given, Campaign):
-                in_memory, source = given, given.name
-            else:
-                in_memory, source = None, os.path.normpath(given)
+            source = given.name if isinstance(given, Campaign) else os.path.normpath(given)
             name = path_name(Path(os.path.abspath(source)).name, "campaign")
             if name in self.sources:
                 raise InputError(f"{self.sources[name]} and {source} are both named {name!r}")
             self.sources[name] = source
             try:
-                fit = fit_campaign(in_memory or read_campaign(source), model, approach)
+                campaign = given if isinstance(given, Campaign) else read_campaign(source)
+                fit = fit_campaign(campaign, model, approach)
                 self.calibrations[name] = Calibration(fit, source=Path(source))
             except InputError as error:
                 self.failed[name] = one_line(error).removeprefix(f"{name}: ")
@@ -162,16 +160,10 @@ class Batch(Result):
     @property
     def parameters(self) -> pd.DataFrame:
         """A row for each parameter of each campaign, SI."""
-        rows = [
-            {
-                "campaign": name,
-                "parameter": entry["name"],
-                **{key: entry[key] for key in PARAMETERS},
-            }
-            for name, calibration in self.calibrations.items()
-            for entry in calibration.content["parameters"]
-        ]
-        return pd.DataFrame(rows, columns=["campaign", "parameter", *PARAMETERS])
+        each = {name: one.content["parameters"] for name, one in self.calibrations.items()}
+        tables = {name: pd.DataFrame(rows)[["name", *PARAMETERS]] for name, rows in each.items()}
+        table = pd.concat(tables, names=["campaign"]).reset_index("campaign")
+        return table.rename(columns={"name": "parameter"}).reset_index(drop=True)
 
     def draw(self, ax: Axes) -> None:
         """Draw the tilt error that each calibration leaves."""

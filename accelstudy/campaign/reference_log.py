@@ -134,7 +134,7 @@ class ReferenceLog:
         angles = angles_of(frame.to_frd(own))
         noise = hold_noise([records[n] for n in table.index[used]], self.log.step).accuracy.allan
         reference = ReferenceSensor(
-            calibration=self.calibration.content["campaign"],
+            calibration=self.calibration.document.campaign,
             frame=frame.name,
             sigma_mps2=noise,
             effects=[effect.spec for effect in self.calibration.model.effects],
@@ -163,7 +163,7 @@ class ReferenceLog:
     def _records(self, holds: Holds, apart: float) -> tuple[dict[int, Array], dict[int, str]]:
         """Samples (m, 3) of the reference, m/s², in holds, and why it has none in others."""
         log, table, where = self.log, holds.table, f"`reference_log` {self.log.path}"
-        full_range = self.calibration.content.get("range_mps2") or np.inf
+        full_range = self.calibration.document.range_mps2 or np.inf
         limit = MAX_WANDER * windows_at_rest(log).threshold
         time, forces = log.time + apart, log.forces @ self.calibration.mending.T
         records: dict[int, Array] = {}
@@ -252,9 +252,9 @@ def usable_reference(path: Path) -> SensorCalibration:
         If it tells no angles with their sigmas.
     """
     calibration, where = read_calibration(path), f"`reference` {path}"
-    quality = calibration.content["quality"]
-    if not quality["plausible"]:
-        why = "; ".join(quality["warnings"])
+    quality = calibration.document.quality
+    if not quality.plausible:
+        why = "; ".join(quality.warnings)
         raise InputError(f"{where}: do not use this calibration: {why}")
     if not np.isfinite(calibration.covariance).all():
         raise InputError(

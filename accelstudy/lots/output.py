@@ -22,7 +22,7 @@ from accelstudy.basics.names import path_name
 from accelstudy.basics.progress import say, show
 from accelstudy.basics.units import GON, MGON, shown_unit, to_display
 from accelstudy.basics.wording import probability
-from accelstudy.campaign.calibration.campaign_fit import CampaignFit, JudgedNoise
+from accelstudy.campaign.calibration.campaign_fit import CampaignFit
 from accelstudy.campaign.calibration.figures import SUSPECT
 from accelstudy.campaign.calibration.file_format import CalibrationDocument
 from accelstudy.campaign.calibration.fit import fit_campaign, usual_approach
@@ -186,7 +186,7 @@ class Lot(Result):
         would look like scatter of the parameters.
         """
         own, noise = fit.sigma**2, self.diagnosis.last.sensors[i].noise
-        if fit.trusts_sigma or noise is None:
+        if fit.noise.trusted or noise is None:
             return own
         r, ratio = fit.adjustment.redundancy, (noise.sigma / fit.sigma_position_posteriori) ** 2
         return own * float((r + noise.freedom * ratio) / (r + noise.freedom))
@@ -326,8 +326,7 @@ def _parameters_of(found: LotEffect) -> Sequence[str]:
 
 def _squared_error(fit: CampaignFit, model: SensorModel) -> Array:
     """Square of the error less that by noise: of nested models the difference of covariances."""
-    noise = JudgedNoise(fit.trusts_sigma, fit.variance_factor)
-    base = replace(fit_campaign(fit.campaign, model, fit.approach), judged=noise)
+    base = replace(fit_campaign(fit.campaign, model, fit.approach), judged=fit.noise)
     f_b = cap_forces(MAX_TILT_GON * GON, ATTITUDES, fit.gravity)
     hold = holds_in_use(fit.campaign.hold, fit.campaign.n_positions, f_b)
     error = tilt_error(

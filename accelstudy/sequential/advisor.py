@@ -120,7 +120,7 @@ def advise(
     known, at = _knowledge(campaign, model, approach, fit)
 
     stated = campaign.sigma_force is not None
-    trusted = stated if fit is None else fit.trusts_sigma
+    trusted = stated if fit is None else fit.noise.trusted
     wrong = fit is not None and fit.state in (REJECTED, IMPLAUSIBLE)
     noise = campaign_noise(campaign)
     if fit is not None:

@@ -70,7 +70,8 @@ def read_calibration(path: str | PathLike[str]) -> Calibration:
     from accelstudy.campaign.calibration.result import Calibration
     from accelstudy.campaign.calibration.sensor_calibration import read_calibration as read
 
-    return Calibration(None, read(path_of("path", path)).content)
+    document = read(path_of("path", path)).document
+    return Calibration(None, document.model_dump(by_alias=True))
 
 
 @verb

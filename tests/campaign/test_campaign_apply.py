@@ -253,7 +253,7 @@ def test_what_the_calibration_did_not_see_is_counted():
 
 def test_a_calibration_that_no_sensor_has_is_not_applied_without_a_word(plain):
     quality = {"plausible": False, "warnings": ["s_y is beyond"], "state": "implausible"}
-    doubtful = calibration_of({**plain.content, "log": None, "quality": quality})
+    doubtful = calibration_of({**plain.document.model_dump(), "log": None, "quality": quality})
     _, warnings = leveled_rows(doubtful, mixed_log()[AXES])
     assert "do not use this calibration: s_y is beyond" in warnings
 
@@ -291,7 +291,7 @@ def test_a_log_is_written_with_all_its_cells(plain, log, tmp_path):
     found = pd.read_csv(tmp_path / "out/level.csv", **text)
     pd.testing.assert_frame_equal(found[[*mixed_log()]], pd.read_csv(log, **text)[[*mixed_log()]])
     forces = mixed_log()[["fx", "fy", "fz"]].to_numpy(float)
-    angles, sigmas = plain.level(forces, plain.content["sigma_position_mps2"])
+    angles, sigmas = plain.level(forces, plain.document.sigma_position_mps2)
     expected = np.column_stack(
         [plain.correct(forces), np.stack([angles / GON, sigmas / MGON], -1).reshape(N, 4)]
     )

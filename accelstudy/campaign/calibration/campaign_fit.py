@@ -93,11 +93,6 @@ class CampaignFit:
     judged: JudgedNoise | None = None
 
     @property
-    def sigma_known(self) -> bool:
-        """Whether the campaign gives the noise of its position means."""
-        return self.campaign.sigma_force is not None
-
-    @property
     def parameters(self) -> Array:
         """Estimates of the model's parameters, (u,), SI."""
         return self.adjustment.parameters[0, : self.model.n_parameters]
@@ -105,15 +100,10 @@ class CampaignFit:
     @property
     def global_test(self) -> quality.GlobalTest | None:
         """Test of the whole model; None where sigma is unknown or there is no redundancy."""
-        if not self.sigma_known:
+        if self.campaign.sigma_force is None:
             return None
-        return quality.global_test(
-            self._omega, self.adjustment.redundancy, sigma_dof=self.sigma_dof
-        )
-
-    @property
-    def _omega(self) -> float:
-        return float(self.adjustment.omega[0])
+        omega, r = float(self.adjustment.omega[0]), self.adjustment.redundancy
+        return quality.global_test(omega, r, sigma_dof=self.sigma_dof)
 
     @cached_property
     def solution(self) -> quality.Solution:
@@ -135,26 +125,17 @@ class CampaignFit:
         """
         if self.judged is not None:
             return self.judged
-        test, r = self.global_test, self.adjustment.redundancy
-        if self.sigma_known and (test is None or test.accepted):
-            return JudgedNoise(True, quality.pooled_variance(self._omega, r, self.sigma_dof))
+        test, stated = self.global_test, self.campaign.sigma_force is not None
+        if stated and (test is None or test.accepted):
+            omega, r = float(self.adjustment.omega[0]), self.adjustment.redundancy
+            return JudgedNoise(True, quality.pooled_variance(omega, r, self.sigma_dof))
         return JudgedNoise(False, float(self.adjustment.variance_posteriori[0]))
-
-    @property
-    def trusts_sigma(self) -> bool:
-        """Whether the a-priori noise is quoted."""
-        return self.noise.trusted
-
-    @property
-    def variance_factor(self) -> float:
-        """Variance of unit weight to quote."""
-        return self.noise.variance
 
     @property
     def dof(self) -> float:
         """Degrees of freedom of the noise that is quoted; infinite where it is known."""
         r = self.adjustment.redundancy
-        return self.sigma_dof + r if self.trusts_sigma else r
+        return self.sigma_dof + r if self.noise.trusted else r
 
     @property
     def is_noise_known(self) -> bool:
@@ -164,7 +145,7 @@ class CampaignFit:
     @property
     def sigma_position(self) -> float:
         """Noise of a position mean to quote, m/s²: as stated if trusted, else a posteriori."""
-        return self._sigma_taken * float(np.sqrt(self.variance_factor))
+        return self._sigma_taken * float(np.sqrt(self.noise.variance))
 
     @property
     def sigma_position_posteriori(self) -> float:
@@ -181,7 +162,7 @@ class CampaignFit:
     def covariance(self) -> Array:
         """Covariance matrix of the model's parameters to quote, (u, u), SI."""
         u = self.model.n_parameters
-        return self.variance_factor * self.adjustment.cofactors[0, :u, :u]
+        return self.noise.variance * self.adjustment.cofactors[0, :u, :u]
 
     @property
     def by_reference(self) -> Array | None:
@@ -195,7 +176,7 @@ class CampaignFit:
         q, u = self.adjustment.cofactors[0], self.model.n_parameters
         shared = slice(u, u + self.observed.common.shape[-1])
         part = q[:u, shared] @ np.linalg.solve(q[shared, shared], q[shared, :u])
-        return self.variance_factor * part
+        return self.noise.variance * part
 
     @property
     def sigma(self) -> Array:
@@ -225,11 +206,6 @@ class CampaignFit:
         """|f_b| − g of the holds, (n,), m/s²."""
         return np.linalg.norm(self.corrected, axis=1) - self.gravity
 
-    @property
-    def rms_norm_residual(self) -> float:
-        """Rms of |f_b| − g over the holds, m/s²."""
-        return float(np.sqrt(np.mean(self.norm_residuals**2)))
-
     # --- How good it is
 
     @cached_property
@@ -250,7 +226,7 @@ class CampaignFit:
             self.approach,
             self.observed,
             alpha=OUTLIER_LEVEL,
-            sigma_known=self.trusts_sigma,
+            sigma_known=self.noise.trusted,
         )
         return {int(self.campaign.positions[one.position]): one.p_value for one in found}
 
@@ -262,7 +238,7 @@ class CampaignFit:
     @cached_property
     def components(self) -> VarianceComponents | None:
         """Variance components of accelerometer and robot; None without a robot."""
-        if not self.sigma_known:
+        if self.campaign.sigma_force is None:
             return None
         return variance_components(self.model, self.approach, self.observed)
 
@@ -288,7 +264,7 @@ class CampaignFit:
 
         That of a suspect is from the round in which it was found, without the worse ones before it.
         """
-        p_values = self.tests.p_adjusted(self.trusts_sigma)
+        p_values = self.tests.p_adjusted(self.noise.trusted)
         for position, p_value in self.suspects.items():
             p_values[self.campaign.positions == position] = p_value
         return p_values
@@ -335,7 +311,7 @@ class CampaignFit:
         shares = {effect.name: rms(own) for effect, own in model.parts if effect.part == "sensor"}
         missing = np.zeros(2)
         stated = self.campaign.sigma_force
-        if stated is not None and not self.trusts_sigma:
+        if stated is not None and not self.noise.trusted:
             excess = self.sigma_position_posteriori**2 - stated**2
             by_output = np.mean(np.sum(tilt_by_output(*in_use) ** 2, axis=-1), axis=0)
             missing = np.sqrt(max(excess, 0.0) * by_output)

@@ -45,7 +45,7 @@ def calibration_document(fit: CampaignFit) -> dict[str, Any]:
         "nominal": header.nominal,
         "gravity_mps2": fit.gravity,
         "n_positions": campaign.n_positions,
-        "sigma_source": "a priori" if fit.trusts_sigma else "a posteriori",
+        "sigma_source": "a priori" if fit.noise.trusted else "a posteriori",
         "sigma_dof": fit.dof,
         "sigmas_95": fit.sigmas_95,
         "sigma_position_mps2": fit.sigma_position,
@@ -59,7 +59,7 @@ def calibration_document(fit: CampaignFit) -> dict[str, Any]:
                 "value": fit.parameters[i],
                 "sigma": sigma[i],
                 "ci95": fit.sigmas_95 * sigma[i],
-                "sigma_priori": adjustment.sigma_priori[0, i] if fit.sigma_known else None,
+                "sigma_priori": adjustment.sigma_priori[0, i] if campaign.sigma_force else None,
                 "sigma_posteriori": adjustment.sigma_posteriori[0, i],
                 "unit": parameter.unit,
                 "shown": {
@@ -76,7 +76,7 @@ def calibration_document(fit: CampaignFit) -> dict[str, Any]:
         "redundancy": adjustment.redundancy,
         "variance_of_unit_weight": adjustment.variance_posteriori[0],
         "iterations": int(adjustment.iterations[0]),
-        "rms_norm_residual_mps2": fit.rms_norm_residual,
+        "rms_norm_residual_mps2": np.sqrt(np.mean(fit.norm_residuals**2)),
         "affine": affine and dict(zip(("matrix", "bias_mps2"), affine, strict=True)),
         "mended": None,
         "excluded": campaign.exclusions,
@@ -137,7 +137,7 @@ def _quality(fit: CampaignFit) -> dict[str, Any]:
 def assessed_positions(fit: CampaignFit) -> pd.DataFrame:
     """One row per position: residuals, tests and reliability, in the units that the names say."""
     tests, reliability = fit.tests, fit.reliability
-    scale = np.sqrt(fit.variance_factor)  # reliability is in terms of the a-priori noise
+    scale = np.sqrt(fit.noise.variance)  # reliability is in terms of the a-priori noise
     table = pd.DataFrame(
         {
             "position": fit.campaign.positions,
@@ -145,7 +145,7 @@ def assessed_positions(fit: CampaignFit) -> pd.DataFrame:
             "redundancy": fit.solution.redundancy_numbers,
             "statistic": tests.statistic,
             "dof": tests.dof,
-            "p_value": tests.p_known if fit.trusts_sigma else tests.p_unknown,
+            "p_value": tests.p_known if fit.noise.trusted else tests.p_unknown,
             "p_value_adjusted": fit.p_adjusted,
             "tau": tests.tau,
             "mdb_mps2": scale * reliability.mdb[:, -1],

@@ -69,11 +69,6 @@ class SensorCalibration:
                 raise InputError(f"{where}: parameters: with these no force explains any reading")
         return cls(document, model, parameters, covariance[np.ix_(stays, stays)])
 
-    @cached_property
-    def content(self) -> Mapping[str, Any]:
-        """Content of the file, with defaults of what it lacks."""
-        return self.document.model_dump(by_alias=True)
-
     @property
     def gravity(self) -> float:
         """Gravity where it was calibrated, m/s²."""

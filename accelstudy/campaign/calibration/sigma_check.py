@@ -52,7 +52,7 @@ def check_sigmas(fit: CampaignFit, replicates: int = 2000, seed: int = 1) -> pd.
             f"{fit.campaign.name}: no noise is stated, and no redundancy tells it: there is no "
             "sigma to check"
         )
-    if fit.variance_factor != 1:
+    if fit.noise.variance != 1:
         noise = replace(noise, sigma_force=fit.sigma_position)
     directions = -fit.corrected
     directions /= np.linalg.norm(directions, axis=1, keepdims=True)
