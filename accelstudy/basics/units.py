@@ -207,59 +207,9 @@ _SPELLINGS = {"µ": "u", "μ": "u", "²": "^2", "°C": "degC", "°": "deg", "√
 _QUANTITY = re.compile(r"\s*([+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?)\s*(\S*)\s*")
 
 
-def parse_quantity(
-    text: str, unit: str, least: float = -math.inf, most: float = math.inf, bare: bool = False
-) -> float:
-    """Read a number with its unit, as a person writes it: 10mgon, 0.01°, 2 mm/s2, 22.5µg/√Hz.
-
-    Parameters
-    ----------
-    text : str
-    unit : str, SI unit of the quantity
-    least, most : float, in that unit, both allowed
-    bare : bool, whether a number without a unit is one in that unit
-
-    Returns
-    -------
-    float, in the SI `unit`
-
-    Raises
-    ------
-    InputError
-        If it is no such quantity, or out of bounds. Only 0 needs no unit.
-    """
-    match = _QUANTITY.fullmatch(text)
-    known = UNITS.get(unit, {unit: 1.0})
-    if match is None or not (match[2] or bare or float(match[1]) == 0):
-        number = "a number" if bare else "a number with its unit"
-        ends = _ends(least, most)
-        like = f", as 2{next(iter(known))}" if unit != "1" else ends and f" of{ends}"
-        raise InputError(f"expected {number}{like}, not {brief(text)}")
-    name = match[2] or (unit if bare else next(iter(known)))
-    for spelling, plain in _SPELLINGS.items():
-        name = name.replace(spelling, plain)
-    name = re.sub(r"(?<=[a-zA-Z])2", "^2", name)
-    if name not in known:
-        raise InputError(f"{brief(text)}: the unit must be one of {', '.join(known)}")
-    value = float(match[1]) * known[name]
-    if not least <= value <= most:
-        ends = f"{_ends(least / known[name], most / known[name])} {name}".removesuffix(" 1")
-        raise InputError(f"{brief(text)}: must be{ends}")
-    if math.isinf(value):
-        raise InputError(f"{brief(text)}: must be a finite number")
-    return value
-
-
-def _ends(least: float, most: float) -> str:
-    """Limits in words, after a space; empty without any."""
-    ends = {"at least": least, "at most": most}
-    words = (f" {word} {end:.6g}" for word, end in ends.items() if math.isfinite(end))
-    return " and".join(words)
-
-
 @dataclass(frozen=True)
 class InputQuantity:
-    """A quantity that the user may give, by an option of a command or a key of a configuration.
+    """A quantity that the user may give, by an option of a command or a key of a file.
 
     Attributes
     ----------
@@ -274,8 +224,46 @@ class InputQuantity:
     bare: bool = False
 
     def read(self, text: str) -> float:
-        """Value of a text with its unit, SI; raises `InputError` if it is not one."""
-        return parse_quantity(text, self.unit, self.least, self.most, self.bare)
+        """Read a number with its unit, as a person writes it: 10mgon, 0.01°, 2 mm/s2, 22.5µg/√Hz.
+
+        Returns
+        -------
+        float, SI
+
+        Raises
+        ------
+        InputError
+            If it is no such quantity, or out of bounds. Only 0 needs no unit.
+        """
+        match = _QUANTITY.fullmatch(text)
+        known = UNITS.get(self.unit, {self.unit: 1.0})
+        first = next(iter(known))
+        if match is None or not (match[2] or self.bare or float(match[1]) == 0):
+            number = "a number" if self.bare else "a number with its unit"
+            ends = _ends(self.least, self.most)
+            like = f", as 2{first}" if self.unit != "1" else ends and f" of{ends}"
+            raise InputError(f"expected {number}{like}, not {brief(text)}")
+        name = match[2] or (self.unit if self.bare else first)
+        for spelling, plain in _SPELLINGS.items():
+            name = name.replace(spelling, plain)
+        name = re.sub(r"(?<=[a-zA-Z])2", "^2", name)
+        if name not in known:
+            raise InputError(f"{brief(text)}: the unit must be one of {', '.join(known)}")
+        size = known[name]
+        value = float(match[1]) * size
+        if not self.least <= value <= self.most:
+            ends = f"{_ends(self.least / size, self.most / size)} {name}".removesuffix(" 1")
+            raise InputError(f"{brief(text)}: must be{ends}")
+        if math.isinf(value):
+            raise InputError(f"{brief(text)}: must be a finite number")
+        return value
+
+
+def _ends(least: float, most: float) -> str:
+    """Limits in words, after a space; empty without any."""
+    ends = {"at least": least, "at most": most}
+    words = (f" {word} {end:.6g}" for word, end in ends.items() if math.isfinite(end))
+    return " and".join(words)
 
 
 def _numbers(value: ArrayLike) -> NDArray[np.float64]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from difflib import get_close_matches
 from pathlib import Path
@@ -25,7 +26,7 @@ from accelstudy.basics.bounds import Range
 from accelstudy.basics.errors import InputError, brief
 from accelstudy.basics.names import check_path_name
 from accelstudy.basics.plugins import load_plugins
-from accelstudy.basics.units import parse_quantity
+from accelstudy.basics.units import InputQuantity
 
 
 def _no_truth_value(value: Any) -> Any:
@@ -58,9 +59,10 @@ def bounds_of(range_: Range) -> tuple[Any, ...]:
 
 def in_unit(unit: str) -> BeforeValidator:
     """Take a text with a unit, as `8g`, for a number in the SI unit, as the command line does."""
+    quantity = InputQuantity(unit, -math.inf, bare=True)
 
     def read(value: Any) -> Any:
-        return parse_quantity(value, unit, bare=True) if isinstance(value, str) else value
+        return quantity.read(value) if isinstance(value, str) else value
 
     return BeforeValidator(read, json_schema_input_type=float | str)
 

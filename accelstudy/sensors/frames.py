@@ -8,6 +8,7 @@ ROS (REP 103), ``rfu`` that of phones.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -17,10 +18,8 @@ from accelstudy.basics.errors import InputError
 
 Array = NDArray[np.float64]
 
-_LETTERS = ("fb", "rl", "du")
-"""Letters of the axes of frd, in its order; the first of each pair points along the axis."""
 WAYS = {"f": "forward", "b": "back", "r": "right", "l": "left", "d": "down", "u": "up"}
-"""Where an axis points, by the letter of a frame."""
+"""Where an axis points, by the letter of a frame; ways along the axes of frd come first."""
 
 
 @dataclass(frozen=True)
@@ -34,12 +33,17 @@ class Frame:
 
     name: str
 
+    @cached_property
+    def matrix(self) -> Array:
+        """R with f_frd = R f, (3, 3)."""
+        along, against = list(WAYS)[::2], list(WAYS)[1::2]
+        letters = np.array(list(self.name))
+        return 1.0 * np.equal.outer(along, letters) - np.equal.outer(against, letters)
+
     @property
     def order(self) -> NDArray[np.int_]:
         """For each axis of frd the axis of the frame that lies along it, (3,)."""
-        return np.array(
-            [next(i for i, c in enumerate(self.name) if c in pair) for pair in _LETTERS]
-        )
+        return np.argmax(np.abs(self.matrix), axis=1)
 
     @property
     def signs(self) -> Array:
@@ -49,23 +53,13 @@ class Frame:
         about its axis forward or back, pitch about the one to the right or left, yaw about the one
         down or up; the sequence of the turns is the same.
         """
-        return np.array(
-            [
-                1.0 if self.name[i] == pair[0] else -1.0
-                for i, pair in zip(self.order, _LETTERS, strict=True)
-            ]
-        )
+        return np.sum(self.matrix, axis=1)
 
     @property
     def description(self) -> str:
         """Name of the frame, and where its axes point."""
         ways = zip("xyz", self.name, strict=True)
         return f"{self.name}: {', '.join(f'{axis} {WAYS[letter]}' for axis, letter in ways)}"
-
-    @property
-    def matrix(self) -> Array:
-        """R with f_frd = R f, (3, 3)."""
-        return self.signs[:, None] * np.eye(3)[self.order]
 
     def to_frd(self, vectors: ArrayLike) -> Array:
         """Components in frd of vectors (..., 3) in this frame."""
@@ -89,19 +83,19 @@ def parse_frame(name: str) -> Frame:
     InputError
         If the letters do not name each direction once, or make a left-handed frame.
     """
-    letters = name.strip().lower()
-    named = [sum(c in pair for c in letters) for pair in _LETTERS]
-    if len(letters) != 3 or named != [1, 1, 1]:
+    frame = Frame(name.strip().lower())
+    # Not square, or singular, unless three letters name each direction once.
+    handed = round(np.linalg.det(frame.matrix)) if len(frame.name) == 3 else 0
+    if handed == 0:
         raise InputError(
             f"frame {name!r}: expected three letters that say where x, y and z point: f or b "
             "(forward, back), r or l (right, left), d or u (down, up), as frd or flu"
         )
-    frame = Frame(letters)
-    if np.linalg.det(frame.matrix) < 0:
-        other = {"f": "b", "b": "f", "r": "l", "l": "r", "d": "u", "u": "d"}[letters[2]]
+    if handed < 0:
+        other = dict(zip("fbrldu", "bflrud", strict=True))[frame.name[2]]
         raise InputError(
             f"frame {name!r}: is left-handed; with x and y like this z must point the other way: "
-            f"{letters[:2]}{other}"
+            f"{frame.name[:2]}{other}"
         )
     return frame
 

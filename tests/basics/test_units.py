@@ -11,11 +11,11 @@ from accelstudy.basics.units import (
     GON,
     STANDARD_GRAVITY,
     UNITS,
+    InputQuantity,
     angle_note,
     angles_in,
     attitude_unit,
     display_unit,
-    parse_quantity,
     recorded_unit,
     to_attitude,
     to_display,
@@ -86,4 +86,4 @@ def test_angles_in_degrees_are_for_people_only():
     ("0", "m", 0.0),
 ])  # fmt: skip
 def test_a_number_with_its_unit_is_read(text, unit, expected):
-    assert parse_quantity(text, unit) == pytest.approx(expected, rel=1e-14)
+    assert InputQuantity(unit, -math.inf).read(text) == pytest.approx(expected, rel=1e-14)
