@@ -55,6 +55,7 @@ class History(Result):
     estimates : (n, p) array, SI
     covariances : (n, p, p) array
     sigmas : (n, p) array
+    dof : (n,) array, degrees of freedom of these; inf with stated noise
     dates : tuple of n datetime, or empty if there are two without any
     tilt_range : float, rad, over which tilts are compared
     change : accelstudy.epochs.congruence.Congruence, of all parameters
@@ -103,6 +104,7 @@ class History(Result):
         self.estimates = np.array([one.parameters[at] for one, at in each])
         self.covariances = np.array([one.covariance[np.ix_(at, at)] for one, at in each])
         self.sigmas = np.sqrt(np.diagonal(self.covariances, axis1=1, axis2=2))
+        self.dof = np.array([one.dof for one in self.sessions])
         self.interval = None if accuracy is None else Interval(self, accuracy, confidence)
 
     @property
@@ -137,12 +139,7 @@ class History(Result):
     @cached_property
     def change(self) -> Congruence:
         """Congruence of all parameters."""
-        return Congruence(self.estimates, self.covariances, self._dof)
-
-    @property
-    def _dof(self) -> Array:
-        """Degrees of freedom of the covariance matrices, (n,)."""
-        return np.array([one.dof for one in self.sessions])
+        return Congruence(self.estimates, self.covariances, self.dof)
 
     @property
     def test(self) -> Test:
@@ -165,7 +162,7 @@ class History(Result):
             return []
         level = LEVEL / self.model.n_parameters
         each = zip(self.estimates.T, np.square(self.sigmas).T, strict=True)
-        return [ParameterCourse(self.years, *one, self._dof, level) for one in each]
+        return [ParameterCourse(self.years, *one, self.dof, level) for one in each]
 
     def tilt_error(self, first: Array, second: Array) -> TiltError:
         """Tilt error by one set of parameters for another, in conditions of the last session."""
@@ -175,8 +172,8 @@ class History(Result):
         return tilt_error(self.model, first, self.model, second, forces, last.gravity, hold)
 
     @cached_property
-    def tilts(self) -> Array:
-        """Rms by which roll and pitch differ, and that which chance would give, (2, 2), rad.
+    def tilt(self) -> Tilt:
+        """Rms by which roll and pitch differ, and that which chance would give.
 
         Readings are those of the sensor as it was at first; they are leveled as if it had not
         changed, and as it is at last.
@@ -185,14 +182,14 @@ class History(Result):
         covariance = self.covariances[0] + self.covariances[-1]
         by_chance = np.einsum("auw,uw->a", error.quadratic, covariance)
         plain = np.where(error.constant > MIN_DIFFERENCE**2, error.constant, 0.0)
-        return np.sqrt([plain, by_chance])
-
-    @property
-    def tilt(self) -> Tilt:
-        """Tilts, and the range that they are taken over."""
-        names = ("roll_mgon", "pitch_mgon", "roll_by_chance_mgon", "pitch_by_chance_mgon")
-        tilts = dict(zip(names, (self.tilts / MGON).ravel().tolist(), strict=True))
-        return Tilt(**tilts, max_tilt_gon=self.tilt_range / GON)
+        (roll, pitch), (roll_by_chance, pitch_by_chance) = np.sqrt([plain, by_chance]) / MGON
+        return Tilt(
+            roll_mgon=roll,
+            pitch_mgon=pitch,
+            roll_by_chance_mgon=roll_by_chance,
+            pitch_by_chance_mgon=pitch_by_chance,
+            max_tilt_gon=self.tilt_range / GON,
+        )
 
     @cached_property
     def parameters(self) -> list[Parameter]:
