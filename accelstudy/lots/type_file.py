@@ -120,9 +120,10 @@ def write_type(lot: Lot, folder: Path) -> bool:
     model = lot.diagnosis.model
     lasting = [effect for effect in model.effects if not effect.sudden]
     wanted = {parameter.name for effect in lasting for parameter in effect.parameters}
-    # Of what none of the usual sensors has, the campaigns of all tell.
+    # Of what none of the usual sensors has for sure, the campaigns of all tell; the next one may
+    # not have it, as of what belongs to a mounting.
     parameters = {
-        name: one if one.told.any() else replace(one, has=one.usual)
+        name: one if one.told.any() else replace(one, has=one.usual, stays=False)
         for name, one in lot.parameters.items()
         if name in wanted
     }

@@ -19,6 +19,7 @@ from accelstudy.campaign.format import write_campaign
 from accelstudy.campaign.sensor_type import SensorType, read_type
 from accelstudy.lots.noise import NoisePrior
 from accelstudy.lots.output import Lot
+from accelstudy.lots.passes import LotEffect, SensorState
 from accelstudy.lots.type_file import write_type
 from accelstudy.schemes import get_scheme
 from accelstudy.sensors.models import get_model
@@ -41,13 +42,13 @@ def fitted(campaign):
     return fit_campaign(campaign, MODEL, get_approach("gravity"))
 
 
-def type_of(sensors, folder):
-    """The file of a type of which nothing is missing and no sensor is odd."""
+def type_of(sensors, folder, effects=()):
+    """The file of a type in which no sensor is odd; effects of the lot are in none for sure."""
     fits = {i: fitted(one) for i, one in enumerate(sensors)}
     named = [SimpleNamespace(noise=NoisePrior(0.002, 200.0)) for _ in sensors]
     lot = SimpleNamespace(
         last=SimpleNamespace(usual=range(len(sensors)), sensors=named),
-        each=(), effects=(), model=MODEL,
+        each=[SensorState(one.name, (), 1.0) for one in sensors], effects=effects, model=MODEL,
     )  # fmt: skip
     assert write_type(Lot(lot, MODEL, fits, {}, {}), folder)
     return folder / "type.yaml"
@@ -122,6 +123,16 @@ def test_each_command_takes_a_type(tmp_path):
     assert "faces" in advice
     question = ("--sensor", of_type, "--tilt-accuracy", "100mgon", "--out", tmp_path / "p")
     assert "type" in succeed("plan", *question).stdout  # the name of its data sheet
+
+
+def test_the_next_sensor_need_not_have_what_no_sensor_has_for_sure(tmp_path):
+    rng = np.random.default_rng(15)
+    made = [measured("mclaren-24", np.zeros(9), rng, f"s{i}") for i in range(5)]
+    scale = LotEffect(("scale",), 0.8, 0.4, (0.1, 0.9), "scale")
+    read = yaml.safe_load(type_of(made, tmp_path, (scale,)).read_text(encoding="utf-8"))
+    sure = {name: one["in_all"] for name, one in read["parameters"].items()}
+    assert sure == {name: not name.startswith("s_") for name in MODEL.parameter_names}
+    assert all(one["sigma"] > 0 for one in read["parameters"].values())
 
 
 @pytest.fixture(scope="module")
