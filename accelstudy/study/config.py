@@ -212,10 +212,10 @@ Simulated = Annotated[SensorModel | None, _written(OneOrMore[str], _simulated, _
 class SensorNoise(ConfigSection):
     """White noise of the accelerometer."""
 
-    retired = dict.fromkeys(
-        ("per", "rate_hz", "duration_s"),
-        "sigma_mps2 is that of a position's mean, of n samples σ/√n: leave it out",
-    )
+    retired = {  # noqa: RUF012
+        "per": "sigma_mps2 is that of a position's mean, σ/√n of n samples: leave out per, rate_hz "
+        "and duration_s"
+    }
 
     sigma_mps2: kinds.SigmaForce = Field(
         0.002, description="standard deviation of the mean of a position, per axis, m/s²"

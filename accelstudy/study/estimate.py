@@ -40,6 +40,8 @@ PROBABILITIES = np.array([*LOWER, 0.5, *(1 - p for p in reversed(LOWER))])
 """Probabilities of the quantiles of a study."""
 MEAN_OF_NORMAL = float(np.sqrt(2 / np.pi))
 """Mean absolute value of a standard normal variable."""
+MANY, BINS = 10_000, 4096
+"""Numbers from which on they are counted by bins before they are sorted, and these."""
 MIN_DIFFERENCES = 10
 """Differences from which an sd is taken."""
 DIFFERENCE_REPLICATES = 50_000
@@ -233,9 +235,24 @@ def _quantiles(x: Array, p: Array) -> Array:
     place = (x.shape[1] - 1) * p
     below = place.astype(np.intp)
     ends, at = np.unique([below, np.minimum(below + 1, x.shape[1] - 1)], return_inverse=True)
-    # Row by row, as copies of all rows of a million replicates would take much memory.
-    low, high = np.array([np.partition(row, ends)[ends][at] for row in x]).swapaxes(0, 1)
+    low, high = np.array([_ordered(row, ends)[at] for row in x]).swapaxes(0, 1)
     return np.asarray(low + (place - below) * (high - low))
+
+
+def _ordered(x: Array, places: NDArray[np.intp]) -> Array:
+    """Numbers (n,) in order, at some places.
+
+    Many numbers are counted by bins, and only those of the bins that have a place are sorted.
+    """
+    if len(x) < MANY:
+        return np.asarray(np.partition(x, places)[places])
+    least = x.min()
+    bins = ((x - least) * (BINS / ((x.max() - least) or 1.0))).astype(np.int32)
+    counts = np.bincount(bins, minlength=BINS + 1)
+    at = np.searchsorted(np.cumsum(counts), places, side="right")
+    near = np.zeros(BINS + 1, bool)
+    near[at] = True
+    return np.asarray(np.sort(x[near[bins]])[places - np.cumsum(np.where(near, 0, counts))[at]])
 
 
 def _slopes(x: Array, p: Array, wide: Array) -> Array:

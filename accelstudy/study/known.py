@@ -25,16 +25,12 @@ class KnownValues:
 
     Parameters
     ----------
-    cell : Cell, which has a linear theory
+    cell : Cell
+    theory : LinearTheory, of the cell
     """
 
     cell: Cell
-
-    @property
-    def theory(self) -> LinearTheory:
-        """Linear theory of the cell."""
-        assert self.cell.linear_theory is not None
-        return self.cell.linear_theory
+    theory: LinearTheory
 
     @cached_property
     def bias(self) -> Array:

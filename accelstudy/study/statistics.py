@@ -89,7 +89,8 @@ def statistics(
     if not replicates.simulated:
         return CellStatistics(cell)
     converged = np.concatenate([block.converged for block in replicates.simulated])
-    known = KnownValues(cell) if replicates.linear else None
+    theory = cell.linear_theory if replicates.linear else None
+    known = None if theory is None else KnownValues(cell, theory)
     control = "linear" if known is not None and len(converged) >= MIN_REPLICATES else "none"
     count = int(converged.sum())
     total = np.sum([block.correlation_sum for block in replicates.simulated], axis=0)

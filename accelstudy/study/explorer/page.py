@@ -33,10 +33,7 @@ OPTIONS = {
     },
 }
 """Of the table of set-ups, for DataTables."""
-PANES = {
-    **{"cascadePanes": True, "orderable": False, "initCollapsed": True},
-    "layout": "columns-4",
-}
+PANES = {"cascadePanes": True, "orderable": False, "initCollapsed": True, "layout": "columns-4"}
 """Of the panes by which it is filtered."""
 
 

@@ -244,11 +244,6 @@ def handle(label: str, **look: Any) -> Line:
     return Line2D([], [], label=label, **{"color": style.INK, **look})
 
 
-def narrow(label: str) -> str:
-    """Label of a group of parameters for the width or the height of a small panel."""
-    return label.replace("orthogonality", "orthogo-\nnality")
-
-
 def surface(ax: Axes, x: ArrayLike, y: ArrayLike, values: ArrayLike, **limits: Any) -> Image:
     """Draw values (y, x) as a smooth map."""
     ax.grid(False)

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any, TypeAlias
 
 from accelstudy.basics.registry import Registry
 from accelstudy.basics.units import angle_note, angles_in
+from accelstudy.drawing import style
 
 if TYPE_CHECKING:
     import matplotlib.axes
@@ -108,9 +109,7 @@ def draw(name: str, tables: Tables, study: Study) -> Figure:
     """
     import matplotlib as mpl
 
-    from accelstudy.drawing.style import STYLE
-
-    with mpl.rc_context(STYLE), angles_in(study.angle_unit):  # type: ignore[arg-type]
+    with mpl.rc_context(style.STYLE), angles_in(study.angle_unit):  # type: ignore[arg-type]
         return get_figure(name).draw(tables, study)
 
 
@@ -121,6 +120,5 @@ def write_figure(name: str, tables: Tables, study: Study, path: str | Path) -> N
     `draw`.
     """
     from accelstudy.drawing.saving import save
-    from accelstudy.drawing.style import DPI
 
-    save(draw(name, tables, study), path, get_figure(name).title, DPI)
+    save(draw(name, tables, study), path, get_figure(name).title, style.DPI)

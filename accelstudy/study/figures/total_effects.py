@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from accelstudy.basics.units import GON, attitude_unit, to_attitude
 from accelstudy.drawing import style
-from accelstudy.study.figures.panels import handle, in_group_order, line_looks, narrow, panels
+from accelstudy.study.figures.panels import handle, in_group_order, line_looks, panels
 from accelstudy.study.figures.registry import Axes, DataFrame, Figure, Study, Tables, register
 
 THIN: style.Style = {"linewidth": 0.9, "markersize": 1.8}
@@ -31,7 +31,7 @@ def effects_over_roll(tables: Tables, study: Study, number: int, output: str) ->
             group=group,
             roll=to_attitude(table["roll_gon"] * GON),
             head=[rf"$\theta$ = {x:g} {unit}" for x in to_attitude(table["pitch_gon"] * GON)],
-            label=group.map(style.group_label).map(narrow),
+            label=group.map(style.group_label).str.replace("orthogonality", "orthogo-\nnality"),
         )
     )
     looks: dict[str, style.Style] = {}
