@@ -28,7 +28,7 @@ from accelstudy.planning.candidates import (
 from accelstudy.planning.plan import Plan, most_accurate
 from accelstudy.planning.question import Equipment, Question
 from accelstudy.planning.simulated import simulate_candidate
-from accelstudy.schemes.files import parse_scheme
+from accelstudy.positions.scheme_file import parse_scheme
 from accelstudy.sensors.models import get_model
 from accelstudy.sensors.sensor import SensorModel
 from accelstudy.simulation.sessions import Noise

@@ -1,48 +1,13 @@
-"""Schemes in YAML files, such as `accelstudy design` writes.
-
-A scheme of a file has the name that the file gives, with a digest of its directions. So results
-depend on the content of the file, and not on its path.
-"""
+"""Schemes in YAML files, by their paths, and afterwards by their names."""
 
 from __future__ import annotations
 
-import hashlib
 import os
 import re
-from collections.abc import Mapping
 from pathlib import Path
-from typing import Annotated, Any
 
-from pydantic import AfterValidator, Field
-
-from accelstudy.basics.bounds import Range
-from accelstudy.basics.names import path_name
 from accelstudy.files.reading import read_layer
-from accelstudy.files.validation import ConfigSection, PathName, bounds_of, validate
-from accelstudy.positions.scheme import Scheme, unit_vectors
-
-Component = Annotated[float, *bounds_of(Range(-1e100, 1e100))]  # whose square is finite
-
-
-def _not_zero(direction: list[float]) -> list[float]:
-    if not any(direction):
-        raise ValueError("must not be zero")
-    return direction
-
-
-Direction = Annotated[list[Component], Field(min_length=3, max_length=3), AfterValidator(_not_zero)]
-
-
-class SchemeFile(ConfigSection):
-    """The content of a file: directions of gravity in the body frame, of any length."""
-
-    directions: Annotated[list[Direction], Field(min_length=1)]
-    scheme: PathName | None = None
-    title: str | None = None
-    source: str | None = None
-    positions: Any = Field(None, description="attitudes, for people; not read")
-    design: Any = Field(None, description="how it was designed, for people; not read")
-
+from accelstudy.positions.scheme import Scheme
 
 _read: dict[str, Scheme] = {}
 
@@ -60,6 +25,8 @@ def scheme_of_file(path: str | Path) -> Scheme:
     InputError
         One line that names the file, the key, what is wrong and what would be right.
     """
+    from accelstudy.positions.scheme_file import parse_scheme  # slow, and jobs read no schemes
+
     scheme = parse_scheme(read_layer(path), Path(path).stem, path)
     return _read.setdefault(scheme.name, scheme)
 
@@ -67,24 +34,3 @@ def scheme_of_file(path: str | Path) -> Scheme:
 def known_scheme(name: str) -> Scheme | None:
     """Return a scheme that was read from a file before, by its name with the digest."""
     return _read.get(name)
-
-
-def parse_scheme(content: Mapping[str, Any], name: str, source: str | Path = "scheme") -> Scheme:
-    """Make a scheme of the content of a file.
-
-    Parameters
-    ----------
-    content : mapping
-    name : str, of the scheme if the content gives none
-    source : str or path, named in errors
-    """
-    file = validate(SchemeFile, content, source)
-    directions = unit_vectors(file.directions)
-    digest = hashlib.sha256(directions.tobytes()).hexdigest()[:8]
-    return Scheme(
-        name=f"{file.scheme or path_name(name, 'scheme')}@{digest}",
-        title=f"{len(directions)} {file.title or 'of a file'}",
-        directions=directions,
-        status="generated",
-        source=file.source or "",
-    )
