@@ -15,7 +15,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from accelstudy.basics.units import display_unit, recorded_unit, to_display, to_si, unit_label
 from accelstudy.effects import Parameter, effect_names, get_effect
-from accelstudy.sensors.models import TITLES
+from accelstudy.sensors.models import NINE
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -98,6 +98,9 @@ CAUSES = {
     "sensor": "#99CC66",
 }
 
+TITLES = {"bias-scale": "6: bias, scale", NINE: "9: + non-orthogonality"}
+"""Short titles of models; others are named by what they add to these."""
+
 
 def approach_colour(approach: str) -> str:
     """Colour of an approach."""
@@ -173,7 +176,7 @@ def sort_groups(groups: Iterable[str]) -> list[str]:
 
 
 def model_title(model: str) -> str:
-    """Short title of a model; an extension of a registered model is named by what it adds."""
+    """Short title of a model; an extension of one of `TITLES` is named by what it adds."""
     if model in TITLES:
         return TITLES[model]
     known = max(

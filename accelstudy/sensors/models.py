@@ -1,4 +1,4 @@
-"""Sensor models by their names, and Table 1 of the paper as presets of a model and a scheme.
+"""Sensor models by their names.
 
 A person writes a model in one of three ways: by the name of a registered model; as registered
 models and effects joined by + (``bias-scale-nonorthogonality+warm_up(tau=300)``); or as the path of
@@ -10,7 +10,6 @@ from __future__ import annotations
 import os
 import re
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 from functools import cache
 from typing import Any
 
@@ -26,26 +25,15 @@ MODEL_FILE = "model.yaml"
 _NINE = ("bias", "scale", "nonorthogonality")
 NINE = "bias-scale-nonorthogonality"
 """Name of the model of nine parameters, which is taken where none is given."""
-_CROSS_AXIS = f"{NINE}-crossaxis"
 MODELS: dict[str, tuple[str, ...]] = {
     "bias-scale": ("bias", "scale"),
     NINE: _NINE,
-    _CROSS_AXIS: (*_NINE, "cross_axis_misalignment"),
+    f"{NINE}-crossaxis": (*_NINE, "cross_axis_misalignment"),
     f"{NINE}-quadratic": (*_NINE, "quadratic_scale"),
     f"{NINE}-cubic": (*_NINE, "cubic_scale"),
     f"{NINE}-quadratic-cubic": (*_NINE, "quadratic_scale", "cubic_scale"),
 }
 """Name -> effects (Thalmann & Neuner 2018, section 2; nonlinear scale after Cai 2013)."""
-
-TITLES = {
-    "bias-scale": "6: bias, scale",
-    NINE: "9: + non-orthogonality",
-    _CROSS_AXIS: "12: 9 + cross-axis",
-    f"{NINE}-quadratic": "12: 9 + quadratic",
-    f"{NINE}-cubic": "12: 9 + cubic",
-    f"{NINE}-quadratic-cubic": "15: 9 + quadratic + cubic",
-}
-"""Short titles for figures."""
 
 
 def get_model(text: str, extra: Mapping[str, SensorModel] | None = None) -> SensorModel:
@@ -162,35 +150,3 @@ def _model_of_file(path: str, name: str | None) -> SensorModel:
             return _composed(effects, str(name or key.removeprefix("models.")))
         except InputError as error:
             raise InputError(f"{path}: {key}: {error}") from None
-
-
-@dataclass(frozen=True)
-class Preset:
-    """One row of the paper's Table 1 (or one of the schemes a row names)."""
-
-    name: str
-    source: str
-    model: str
-    scheme: str
-
-
-_SIX_MODEL = "bias-scale"
-_PRETTO_TEDALDI = "[25] Pretto & Grisetti, [26] Tedaldi 2014"
-
-PRESETS: tuple[Preset, ...] = (
-    Preset("loetters-1998", "[21] Lötters 1998", _SIX_MODEL, "faces-6"),
-    Preset("shin-2002", "[22] Shin & El-Sheimy 2002", NINE, "faces-edges-18"),
-    Preset("skog-2006", "[14] Skog & Händel 2006", NINE, "faces-edges-18"),
-    Preset("syed-2007", "[15] Syed 2007", NINE, "faces-edges-18"),
-    Preset("syed-2007-26", "[15] Syed 2007, 26", NINE, "faces-edges-corners-26"),
-    Preset("qureshi-2017", "[23] Qureshi 2017", NINE, "faces-edges-18"),
-    Preset("fong-2008-18", "[20] Fong 2008, 18", _CROSS_AXIS, "faces-edges-18"),
-    Preset("fong-2008-24", "[20] Fong 2008, 24", _CROSS_AXIS, "rings-24"),
-    Preset("zhang-2010", "[17] Zhang 2010", NINE, "d-optimal-9"),
-    Preset("cai-2013", "[24] Cai 2013", f"{NINE}-quadratic", "mclaren-24"),
-    Preset("tedaldi-2014-36", f"{_PRETTO_TEDALDI}, 36", NINE, "fibonacci-36"),
-    Preset("tedaldi-2014-38", f"{_PRETTO_TEDALDI}, 38", NINE, "xsens-38"),
-    Preset("tedaldi-2014-50", f"{_PRETTO_TEDALDI}, 50", NINE, "fibonacci-50"),
-    Preset("lv-2017", "[19] Lv 2017", _CROSS_AXIS, "icosidodecahedron-30"),
-)
-"""Table 1 of Thalmann & Neuner (2018); the misalignment of [19] spans the cross-axis angles."""

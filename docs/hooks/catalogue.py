@@ -14,7 +14,6 @@ from accelstudy.data_sheets.sheet import MEANINGS, QUANTITIES
 from accelstudy.effects import get_effect
 from accelstudy.noise_effects import get_noise_effect
 from accelstudy.schemes import get_scheme, scheme_families, scheme_names
-from accelstudy.sensors.models import PRESETS
 from accelstudy.verbs.tables import plain_number as number
 
 GETTERS = {"noise": get_noise_effect, "sensor": get_effect, "rig": get_effect}
@@ -57,12 +56,6 @@ def models():
     """Models."""
     rows = accelstudy.catalogue("models").itertuples()
     return table(("model", "", "parameters"), [(code(r[0]), r[2], code(r[1])) for r in rows])
-
-
-def presets():
-    """The presets of Table 1."""
-    rows = [(p.source, code(p.model), f"[`{p.scheme}`](schemes.md)") for p in PRESETS]
-    return table(("source", "model", "scheme"), rows)
 
 
 def schemes():
