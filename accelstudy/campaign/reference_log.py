@@ -6,14 +6,13 @@ from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from itertools import permutations, product
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from accelstudy.basics.errors import InputError, key
 from accelstudy.basics.units import GON
-from accelstudy.campaign.calibration.sensor_calibration import SensorCalibration, read_calibration
 from accelstudy.campaign.gross_errors.recognition import check_size
 from accelstudy.campaign.importing.holds import (
     MAX_WANDER,
@@ -27,6 +26,9 @@ from accelstudy.campaign.importing.noise import hold_noise, sigma_text
 from accelstudy.campaign.reference import ReferenceSensor
 from accelstudy.leveling.angles import angles_of, near_pole
 from accelstudy.sensors.frames import Frame
+
+if TYPE_CHECKING:
+    from accelstudy.campaign.calibration.sensor_calibration import SensorCalibration
 
 Array = NDArray[np.float64]
 
@@ -251,6 +253,9 @@ def usable_reference(path: Path) -> SensorCalibration:
     InputError
         If it tells no angles with their sigmas.
     """
+    # An import without a reference takes no time for what reads a calibration.
+    from accelstudy.campaign.calibration.sensor_calibration import read_calibration
+
     calibration, where = read_calibration(path), f"`reference` {path}"
     quality = calibration.document.quality
     if not quality.plausible:

@@ -96,11 +96,10 @@ def resolve_layout(
         told |= raw.layout  # the times of its index
     chosen = _overlaid(like, told, given)
     columns = chosen.columns | ({} if chosen.time is None else {"time": chosen.time})
-    wanted = (*AXES, *(("time",) if chosen.rate is None else ()), *CONDITIONS, *more)
-    for name in chosen.columns:
-        if name not in (*AXES, *CONDITIONS, *more):
-            known = (*AXES, *CONDITIONS, *more)
-            raise UnknownNameError("column", name, known)
+    known = (*AXES, *CONDITIONS, *more)
+    wanted = known if chosen.rate is not None else (*AXES, "time", *CONDITIONS, *more)
+    for name in chosen.columns.keys() - {*known}:
+        raise UnknownNameError("column", name, known)
     try:
         places = _find_places(raw, columns, {*given, *given.get("columns", ())}, wanted)
     except InputError as error:

@@ -8,7 +8,7 @@ with a threshold, which comes from the data.
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import pairwise
 from statistics import NormalDist
@@ -46,6 +46,8 @@ MAX_REST_NOISE = 0.02
 MAX_COARSE_RATIO = 1.75
 """Noise of windows, as a multiple of that of rounding, up to which a sensor at rest may read the
 same number all the time: that of noise of 0.4 steps."""
+_TOGETHER = 2**16
+"""Windows that are worked out together: what a processor keeps at hand is small."""
 _DECADES, _PER_DECADE = 40, 50
 """Bins of the histogram of variances: decades on both sides of 1 (m/s²)², and bins of each."""
 MAX_SATURATED_SHARE = 0.05
@@ -226,16 +228,19 @@ def noise_of_steps(steps: Array) -> float:
 
 def window_variance(forces: Array, width: int) -> tuple[Array, NDArray[np.bool_]]:
     """Norm of the variances of the axes about each sample, (n,), and where an axis is constant."""
-    variance, constant = np.zeros(len(forces)), np.zeros(len(forces), dtype=bool)
-    for force in forces.T:
-        variance += pd.Series(force).rolling(width, center=True).var(ddof=0).to_numpy() ** 2
+    variance, constant = np.full(len(forces), np.nan), np.zeros(len(forces), dtype=bool)
+    for first in range(0, len(forces) - width + 1, _TOGETHER):
+        block = forces[first : first + _TOGETHER + width - 1]
+        middle = slice(first + width // 2, first + len(block) - width // 2)
+        of_axes = pd.DataFrame(block).rolling(width).var(ddof=0).to_numpy()[width - 1 :]
+        variance[middle] = np.sqrt(np.sum(of_axes**2, axis=1))
         # Rounding may hide a variance of zero, so readings that do not change are counted.
-        same = np.diff(force) == 0
-        if np.count_nonzero(same) >= width - 1:
-            alike = np.concatenate([[0], np.cumsum(same)])
+        same = np.diff(block, axis=0, prepend=block[:1]) == 0
+        if np.count_nonzero(same, axis=0).max() >= width:
+            alike = np.cumsum(same, axis=0)
             still = alike[width - 1 :] - alike[: 1 - width] == width - 1
-            constant[width // 2 : len(force) - width // 2] |= still
-    return np.sqrt(variance), constant
+            constant[middle] = np.any(still, axis=1)
+    return variance, constant
 
 
 def _noise_floor(variance: Array) -> float:
@@ -283,29 +288,27 @@ def find_holds(log: Log, settings: ImportSettings) -> Holds:
     """
     windows = windows_at_rest(log, settings.window, settings.threshold)
     runs, too_short = _runs_at_rest(log, windows, settings)
+    table = _table_of(log, range(1, len(runs) + 1), runs)
     # A sensor that turns slowly is nearly still in each window, yet has no constant attitude: its
     # force changes over the run by more than within each of them.
-    turns = [scatter(log.forces[run]) > MAX_WANDER * windows.threshold for run in runs]
-    reasons = {i: TURNS for i, turning in enumerate(turns) if turning}
-    reasons |= dict.fromkeys(find_saturated(log, windows, runs, settings), SATURATED)
-    numbers = dict(enumerate(range(len(runs)), 1))
+    wander = np.sqrt(np.linalg.norm(table[[*SDS]] ** 2, axis=1))
+    table.loc[wander > MAX_WANDER * windows.threshold, "left_out"] = TURNS
+    table.loc[find_saturated(log, windows, runs, settings), "left_out"] = SATURATED
     if len(log.parts) > 1:
-        part, lengths = log.part, [run.stop - run.start for run in runs]
-        last_is_best = sorted(range(len(runs)), key=lambda i: (i not in reasons, lengths[i]))
-        numbers = dict(sorted({int(part[runs[i].start]) + 1: i for i in last_is_best}.items()))
-    left_out = {n: reasons[i] for n, i in numbers.items() if i in reasons}
-    why = Counter(left_out.values())
+        table.index = log.part[table["start"].astype(int)] + 1
+        best_last = table.assign(used=table["left_out"] == "").sort_values(["used", "n"])
+        table = best_last.groupby(level=0).tail(1).sort_index().drop(columns="used")
+    why = Counter(reason for reason in table["left_out"] if reason)
     lost = [f"{plural(count, 'hold')} left out: {reason}" for reason, count in why.items()]
     warnings = [*windows.warnings, *lost, *too_short]
-    if len(left_out) == len(numbers):
+    if not (table["left_out"] == "").any():
         if TURNS in why:
             raise _never_still(log, windows, "it turns slowly in all that looks like a hold")
         raise InputError(
             f"{log.path}: no static hold of {settings.shortest:g} s or more (a window is at rest "
             f"up to {windows.threshold:.3g} m/s²)" + "".join(f"; {w}" for w in warnings)
         )
-    holds = {n: runs[i] for n, i in numbers.items()}
-    return _holds_of(log, windows, holds, left_out, settings, warnings)
+    return _holds_of(log, windows, table, settings, warnings)
 
 
 def _runs_at_rest(
@@ -364,33 +367,28 @@ def find_blocks(log: Log, settings: ImportSettings) -> Holds:
             )
         block = row // size  # a row that is left out counts as well
     edges = [*np.flatnonzero(np.diff(block, prepend=-1)).tolist(), len(block)]
-    blocks = {int(block[i]) + 1: slice(i, end) for i, end in pairwise(edges)}
     least = size or int(np.diff(edges).min())
     if least < PARTS:
         raise InputError(f"{log.path}: {least} samples; a position has at least {PARTS}")
     # Blocks of which most is left out are no positions, which the report says.
-    blocks = {n: each for n, each in blocks.items() if each.stop - each.start >= PARTS}
-    windows, numbers = slide_windows(log, (least // 2) | 1), [*blocks]
-    full = find_saturated(log, windows, [*blocks.values()], settings)
-    left_out = {numbers[i]: SATURATED for i in full}
-    scatters = {
-        n: scatter(np.array([p.mean(axis=0) for p in np.array_split(log.forces[each], PARTS)]))
-        for n, each in blocks.items()
-        if n not in left_out
-    }
-    if not scatters:
+    blocks = [slice(i, end) for i, end in pairwise(edges) if end - i >= PARTS]
+    table = _table_of(log, [int(block[each.start]) + 1 for each in blocks], blocks)
+    windows = slide_windows(log, (least // 2) | 1)
+    full = find_saturated(log, windows, blocks, settings)
+    if full.all():
         raise InputError(f"{log.path}: the sensor is saturated in all blocks of {least} samples")
+    parts = [np.array_split(log.forces[each], PARTS) for each in blocks]
+    moved = np.array([scatter(np.array([p.mean(axis=0) for p in each])) for each in parts])
     # Rounding hides the scatter of a coarse sensor.
     hidden = THRESHOLD_FACTOR / MAX_TREMOR * noise_of_steps(windows.steps)
-    usual = max(float(np.median([*scatters.values()])), hidden)
+    usual = max(float(np.median(moved[~full])), hidden)
     reason = f"{MAX_TREMOR:g} times the scatter of the {PARTS} parts of a typical block"
     windows = windows._replace(threshold=MAX_TREMOR * usual, floor=usual, reason=reason)
     if settings.threshold:
         windows = windows._replace(threshold=settings.threshold, floor=np.nan, reason="as given")
-    for number, each in scatters.items():
-        if each > windows.threshold:
-            left_out[number] = f"the sensor moves: its parts scatter by {each:.2g} m/s²"
-    return _holds_of(log, windows, blocks, left_out, settings, windows.warnings, least)
+    why = [f"the sensor moves: its parts scatter by {each:.2g} m/s²" for each in moved]
+    table["left_out"] = np.select([full, moved > windows.threshold], [SATURATED, why], "")
+    return _holds_of(log, windows, table, settings, windows.warnings, least)
 
 
 # --- What is no measurement ----------------------------------------------------------------------
@@ -403,45 +401,42 @@ def scatter(forces: Array) -> float:
 
 def find_saturated(
     log: Log, windows: Windows, holds: Sequence[slice], settings: ImportSettings
-) -> list[int]:
-    """Find holds with samples at the sensor's range or, if it is unknown, at the extreme.
+) -> NDArray[np.bool_]:
+    """Find holds with samples at the sensor's range or, if it is unknown, at the extreme, (n,).
 
     In a hold of n samples of which none lies beyond the last step, the mean may be so high that
     `MAX_BEYOND` of them were expected there. Those above the last edge but one are as many as the
     step, and the noise before rounding, explain.
-
-    Returns
-    -------
-    list of int, places of the holds in their sequence
     """
     forces, step = [log.forces[hold] for hold in holds], windows.steps
     # The range of counts is unknown if their offset is.
     if settings.range is not None and (log.layout.unit, log.layout.offset) != ("counts", None):
         # The largest reading of a converter is a step less than its range.
         limit = settings.range - step.max()
-        return [i for i, each in enumerate(forces) if reaches_range(each, limit)]
+        return np.array([reaches_range(each, limit) for each in forces], dtype=bool)
     if not forces:
-        return []
-    ends, inner = np.empty((2, 2, 3))
-    for axis, force in enumerate(log.forces.T):
-        read = force[windows.about]
-        low, high = ends[:, axis] = read.min(), read.max()
-        inner[0, axis] = np.min(read, where=read > low, initial=np.inf)
-        inner[1, axis] = np.max(read, where=read < high, initial=-np.inf)
+        return np.zeros(0, dtype=bool)
+    read = log.forces[windows.about]
+    ends = np.array([read.min(axis=0), read.max(axis=0)])
+    inner = np.array([
+        np.min(read, axis=0, where=read > ends[0], initial=np.inf),
+        np.max(read, axis=0, where=read < ends[1], initial=-np.inf),
+    ])  # fmt: skip
     noise = noise_before_rounding(step, np.median([f.std(axis=0, ddof=1) for f in forces], axis=0))
     with np.errstate(divide="ignore", invalid="ignore"):
         steps = np.where(step > 0, step / noise, 0.0)
     steps[noise == 0] = np.inf  # every reading is the same in most holds
-    normal, found = NormalDist(), []  # scipy.special takes long to import
-    for i, each in enumerate(forces):
+    normal = NormalDist()  # scipy.special takes long to import
+    saturated = []
+    for each in forces:
         n = len(each)
         at_end, beside = (np.sum(each == x[:, None], axis=1) for x in (ends, inner))
         middle = normal.inv_cdf(min(MAX_BEYOND / n, 0.5))
         share = np.array([normal.cdf(middle + step) for step in steps])
         explained = n * share + MIN_WITHIN * np.sqrt(n * share * (1 - share))
-        if np.any((at_end > np.maximum(MAX_SATURATED_SHARE * n, explained)) & (at_end > beside)):
-            found.append(i)
-    return found
+        piled = at_end > np.maximum(MAX_SATURATED_SHARE * n, explained)
+        saturated.append(np.any(piled & (at_end > beside)))
+    return np.array(saturated)
 
 
 def reaches_range(forces: Array, full_range: float) -> bool:
@@ -454,11 +449,26 @@ def reaches_range(forces: Array, full_range: float) -> bool:
 # --- The table of holds --------------------------------------------------------------------------
 
 
+def _table_of(log: Log, numbers: Sequence[int], holds: Sequence[slice]) -> pd.DataFrame:
+    """Table of holds, none of them left out; see `Holds`."""
+    rows = []
+    for hold in holds:
+        forces, time = log.forces[hold], log.time[hold]
+        row = [hold.start, hold.stop, time[0], time[-1], len(forces), *forces.mean(axis=0)]
+        row += [*forces.std(axis=0, ddof=1)]
+        for name in log.conditions:
+            power = 2 if name == "vibration" else 1
+            known = log.samples[name].iloc[hold].dropna().to_numpy() ** power
+            row.append(known.mean() ** (1 / power) if len(known) else np.nan)
+        rows.append([*row, ""])
+    names = ["start", "end", "t0", "t1", "n", *AXES, *SDS, *log.conditions, "left_out"]
+    return pd.DataFrame(rows, index=[*numbers], columns=names)
+
+
 def _holds_of(
     log: Log,
     windows: Windows,
-    holds: Mapping[int, slice],
-    left_out: Mapping[int, str],
+    table: pd.DataFrame,
     settings: ImportSettings,
     warnings: Sequence[str],
     size: int | None = None,
@@ -470,35 +480,25 @@ def _holds_of(
     InputError
         If there is no such hold, a person leaves all of them out, or the sensor was never still.
     """
-    left_out = {**left_out, **settings.left_out}
-    for number in sorted(left_out.keys() - holds.keys()):
-        there = short_list([str(each) for each in holds])
-        raise InputError(f"exclude: there is no hold {number}; they are {there}")
-    used = [log.forces[hold] for number, hold in holds.items() if number not in left_out]
-    if not used:
+    for number, reason in sorted(settings.exclude.items()):
+        if number not in table.index:
+            there = short_list([*map(str, table.index)])
+            raise InputError(f"exclude: there is no hold {number}; they are {there}")
+        table.loc[number, "left_out"] = reason
+    used = table[table["left_out"] == ""]
+    if used.empty:
         why = f"exclude: no {'hold' if size is None else 'block'} is left"
-        raise InputError(f"{log.path}: {why} ({next(iter(left_out.values()))})")
-    rows = []
-    for number, hold in holds.items():
-        forces, time = log.forces[hold], log.time[hold]
-        row = {"start": hold.start, "end": hold.stop, "t0": time[0], "t1": time[-1]}
-        row |= {"n": len(forces), **dict(zip(AXES, forces.mean(axis=0), strict=True))}
-        row |= dict(zip(SDS, forces.std(axis=0, ddof=1), strict=True))
-        for name in log.conditions:
-            power = 2 if name == "vibration" else 1
-            known = log.samples[name].iloc[hold].dropna().to_numpy() ** power
-            row[name] = known.mean() ** (1 / power) if len(known) else np.nan
-        rows.append({**row, "left_out": left_out.get(number, "")})
-    table = pd.DataFrame(rows, index=[*holds])
-    noise = hold_noise(used, log.step, windows.steps)
-    found = Holds(log, windows, table, noise, tuple(warnings), size)
-    if _moves(found, used):
+        raise InputError(f"{log.path}: {why} ({table['left_out'].iloc[0]})")
+    records = [log.forces[start:end] for start, end in used[["start", "end"]].to_numpy()]
+    noise = hold_noise(records, log.step, windows.steps)
+    holds = Holds(log, windows, table, noise, tuple(warnings), size)
+    if _moves(holds, records):
         why = (
             f"what looks like rest varies by {windows.floor:.3g} m/s², slowly like a hand, not "
             "like the noise of a sensor"
         )
         raise _never_still(log, windows, why, size)
-    return found
+    return holds
 
 
 def _moves(holds: Holds, records: Sequence[Array]) -> bool:
@@ -514,11 +514,10 @@ def _moves(holds: Holds, records: Sequence[Array]) -> bool:
         return False
     curve = pooled_deviation(records, holds.log.step)
     reliable = (curve.differences >= MIN_DIFFERENCES) & (curve.tau >= QUICK_RATIO)
+    if not reliable.any():
+        return True
     white = sd * np.sqrt(holds.log.step / curve.tau[reliable])
-    return bool(
-        np.max(curve.pooled[reliable] / white, initial=np.inf if not len(white) else 0.0)
-        > SLOW_RATIO
-    )
+    return bool(np.max(curve.pooled[reliable] / white) > SLOW_RATIO)
 
 
 def _never_still(log: Log, windows: Windows, why: str, size: int | None = None) -> InputError:

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import re
 from collections.abc import Mapping
-from typing import Annotated, Any, ClassVar, Literal, Self
+from typing import Annotated, Any, ClassVar, Literal
 
-from pydantic import Field, model_validator
+from pydantic import BeforeValidator, Field
 
-from accelstudy.basics.errors import InputError, key
+from accelstudy.basics.errors import key
 from accelstudy.basics.units import STANDARD_GRAVITY
 from accelstudy.campaign.header import LogLayout
 from accelstudy.files.reading import overlay, read_layer
@@ -24,6 +24,19 @@ from accelstudy.files.validation import (
 _EXCLUDED = re.compile(r"(\d{1,9}(?:\s*,\s*\d{1,9})*)\s*:\s*(\S.*)", re.DOTALL)
 """Holds by their numbers, and why they are left out."""
 Force = Annotated[Positive, Field(le=1e6), in_unit("m/s^2")]
+
+
+def _parse_exclusions(texts: Any) -> Any:
+    """Parse ``13,14:moved`` to numbers of holds with the reason."""
+    reasons: dict[int, str] = {}
+    for text in [texts] if isinstance(texts, str) else texts if isinstance(texts, list) else ():
+        if (match := _EXCLUDED.fullmatch(str(text).strip())) is None:
+            raise ValueError(
+                "expected holds by their numbers in segmentation.png, and why, as 13:moved or "
+                f"13,14:moved, not {text!r}"
+            )
+        reasons |= dict.fromkeys(map(int, match[1].split(",")), " ".join(match[2].split()))
+    return reasons if isinstance(texts, str | list) else texts
 
 
 class ImportSettings(LogLayout):
@@ -69,42 +82,15 @@ class ImportSettings(LogLayout):
         0.2, description="cut from both ends of a hold"
     )
     shortest: Annotated[Positive, in_unit("s")] = Field(1.0, description="shortest hold")
-    exclude: list[str] = Field(
-        [], description="holds to leave out, and why, as 13:moved or 13,14:somebody passed"
+    exclude: Annotated[dict[int, str], BeforeValidator(_parse_exclusions)] = Field(
+        {}, description="holds to leave out, and why, as 13:moved or 13,14:somebody passed"
     )
-
-    @model_validator(mode="before")
-    @classmethod
-    def _no_section(cls, content: Any) -> Any:
-        if isinstance(content, Mapping) and isinstance(content.get("gravity"), Mapping):
-            raise ValueError(
-                "gravity: no longer a section; write its value, as 9.81, and gravity_sigma"
-            )
-        return content
-
-    @model_validator(mode="after")
-    def _names_holds(self) -> Self:
-        _ = self.left_out
-        return self
 
     @property
     def said(self) -> dict[str, Any]:
         """Keys of the layout of the log that were said."""
         fields = {*LogLayout.model_fields}
         return self.model_dump(include=fields, exclude_unset=True, exclude_none=True)
-
-    @property
-    def left_out(self) -> dict[int, str]:
-        """Numbers of the holds to leave out, with the reason: ``13:moved``."""
-        reasons: dict[int, str] = {}
-        for text in self.exclude:
-            if (match := _EXCLUDED.fullmatch(text.strip())) is None:
-                raise InputError(
-                    "exclude: expected holds by their numbers in segmentation.png, and why, as "
-                    f"13:moved or 13,14:moved, not {text!r}"
-                )
-            reasons |= dict.fromkeys(map(int, match[1].split(",")), " ".join(match[2].split()))
-        return reasons
 
 
 def settings_of(
