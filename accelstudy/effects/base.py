@@ -15,7 +15,7 @@ serves NumPy arrays, symbols to differentiate, and generated code.
 from __future__ import annotations
 
 import re
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from functools import cache
 from itertools import product
@@ -27,7 +27,15 @@ from numpy.typing import NDArray
 from accelstudy.basics.errors import InputError, UnknownNameError
 from accelstudy.basics.registry import RegistryWithSettings, WithSettings
 from accelstudy.basics.units import STANDARD_GRAVITY
-from accelstudy.effects.components import AXES, ZERO_MATRIX, ZERO_VECTOR, Matrix, Number, Vector
+from accelstudy.effects.components import (
+    ANGLES,
+    AXES,
+    ZERO_MATRIX,
+    ZERO_VECTOR,
+    Matrix,
+    Number,
+    Vector,
+)
 from accelstudy.effects.hold_conditions import HoldConditions
 from accelstudy.effects.hold_symbols import HoldSymbols
 from accelstudy.symbolic.algebra import sp
@@ -48,9 +56,13 @@ class Parameter:
     symbol: str
 
 
-def per_axis(name: str, unit: str, symbol: str) -> tuple[Parameter, ...]:
-    """Make the three parameters of an effect that acts on each axis alike; `%` is the axis."""
-    return tuple(Parameter(f"{name}_{i}", unit, f"${symbol.replace('%', i)}$") for i in AXES)
+def per_axis(
+    name: str, unit: str, symbol: str, axes: Iterable[str] = AXES
+) -> tuple[Parameter, ...]:
+    """Make a parameter of an effect for each axis, pair of axes or angle, `%` in the symbol."""
+    return tuple(
+        Parameter(f"{name}_{i}", unit, f"${symbol.replace('%', ANGLES.get(i, i))}$") for i in axes
+    )
 
 
 class Effect(WithSettings):

@@ -5,6 +5,8 @@ from __future__ import annotations
 from typing import Any
 
 AXES = ("x", "y", "z")
+ANGLES = {"roll": r"\phi", "pitch": r"\theta"}
+"""Angles of a robot, and their symbols."""
 
 # Numbers, arrays or symbols, whatever the namespace `xp` works on.
 Number = Any
@@ -19,3 +21,9 @@ def multiply(matrix: Matrix, vector: Vector) -> Vector:
     """Multiply a matrix with a vector, by components."""
     x, y, z = (sum(a * v for a, v in zip(row, vector, strict=True)) for row in matrix)
     return x, y, z
+
+
+def cross(a: Vector, b: Vector) -> Vector:
+    """Return a × b."""
+    (x, y, z), (u, v, w) = a, b
+    return y * w - z * v, z * u - x * w, x * v - y * u

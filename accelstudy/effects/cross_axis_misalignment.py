@@ -1,6 +1,6 @@
 """Cross-axis misalignment: the three angles that only an outside attitude can see."""
 
-from accelstudy.effects.base import Effect, Parameter, register
+from accelstudy.effects.base import Effect, per_axis, register
 
 
 @register
@@ -13,11 +13,7 @@ class CrossAxisMisalignment(Effect):
 
     name = "cross_axis_misalignment"
     family = "alignment of the axes"
-    parameters = (
-        Parameter("alpha_xz", "rad", r"$\alpha_{xz}$"),
-        Parameter("alpha_xy", "rad", r"$\alpha_{xy}$"),
-        Parameter("alpha_yx", "rad", r"$\alpha_{yx}$"),
-    )
+    parameters = per_axis("alpha", "rad", r"\alpha_{%}", ("xz", "xy", "yx"))
     equation = "lower triangle of T"
     typical = (1e-3, 0.02)
 

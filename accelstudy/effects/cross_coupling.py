@@ -1,6 +1,6 @@
 """Cross-coupling: the output of an axis depends on products with the other two."""
 
-from accelstudy.effects.base import Effect, Parameter, register
+from accelstudy.effects.base import Effect, per_axis, register
 from accelstudy.effects.components import AXES
 
 
@@ -10,9 +10,7 @@ class CrossCoupling(Effect):
 
     name = "cross_coupling"
     family = "even nonlinearity"
-    parameters = tuple(
-        Parameter(f"k_{i}{j}", "1", f"$k_{{{i}{j}}}$") for i in AXES for j in AXES if i != j
-    )
+    parameters = per_axis("k", "1", "k_{%}", [i + j for i in AXES for j in AXES if i != j])
     equation = "Σ k_ij f_i f_j / g, i ≠ j"
     typical = (50e-6, 500e-6)
 

@@ -1,6 +1,7 @@
 """Encoder offset: the robot's axes do not read zero at zero."""
 
-from accelstudy.effects.base import Effect, Parameter, register
+from accelstudy.effects.base import Effect, per_axis, register
+from accelstudy.effects.components import ANGLES
 
 
 @register
@@ -9,10 +10,7 @@ class EncoderOffset(Effect):
 
     name = "encoder_offset"
     family = "attitude of the rig"
-    parameters = (
-        Parameter("c_roll", "rad", r"$c_\phi$"),
-        Parameter("c_pitch", "rad", r"$c_\theta$"),
-    )
+    parameters = per_axis("c", "rad", "c_%", ANGLES)
     equation = "δφ = c_φ, δθ = c_θ"
     typical = (30e-6, 300e-6)
     part = "rig"

@@ -1,6 +1,7 @@
 """Encoder scale: the robot's angles are too large by a factor."""
 
-from accelstudy.effects.base import Effect, Parameter, register
+from accelstudy.effects.base import Effect, per_axis, register
+from accelstudy.effects.components import ANGLES
 
 
 @register
@@ -9,10 +10,7 @@ class EncoderScale(Effect):
 
     name = "encoder_scale"
     family = "attitude of the rig"
-    parameters = (
-        Parameter("k_roll", "1", r"$k_\phi$"),
-        Parameter("k_pitch", "1", r"$k_\theta$"),
-    )
+    parameters = per_axis("k", "1", "k_%", ANGLES)
     equation = "δφ = k_φ φ, δθ = k_θ θ"
     typical = (20e-6, 200e-6)
     part = "rig"

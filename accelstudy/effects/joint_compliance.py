@@ -1,6 +1,7 @@
 """Joint compliance: the robot's joints give way to the load that they carry."""
 
-from accelstudy.effects.base import Effect, Parameter, register
+from accelstudy.effects.base import Effect, per_axis, register
+from accelstudy.effects.components import ANGLES
 
 
 @register
@@ -14,10 +15,7 @@ class JointCompliance(Effect):
 
     name = "joint_compliance"
     family = "attitude of the rig"
-    parameters = (
-        Parameter("c_joint_roll", "rad", r"$c_{j\phi}$"),
-        Parameter("c_joint_pitch", "rad", r"$c_{j\theta}$"),
-    )
+    parameters = per_axis("c_joint", "rad", "c_{j%}", ANGLES)
     equation = "δφ = −c_φ sin 2φ cos θ, δθ = −c_θ sin 2θ cos φ"
     typical = (80e-6, 1.6e-3)
     part = "rig"

@@ -1,6 +1,7 @@
 """Mounting rotation: the sensor is turned on the robot's flange."""
 
 from accelstudy.effects.base import Effect, per_axis, register
+from accelstudy.effects.components import cross
 
 
 @register
@@ -15,5 +16,4 @@ class MountingRotation(Effect):
 
     def output(self, f, p, g, hold, xp):
         """Return ε × f."""
-        (x, y, z), (a, b, c) = f, p
-        return (b * z - c * y, c * x - a * z, a * y - b * x)
+        return cross(p, f)

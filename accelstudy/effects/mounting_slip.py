@@ -1,6 +1,7 @@
 """Mounting slip: the sensor turns once on its mounting."""
 
 from accelstudy.effects.base import per_axis, register
+from accelstudy.effects.components import cross
 from accelstudy.effects.sudden import SuddenEffect
 
 
@@ -21,6 +22,5 @@ class MountingSlip(SuddenEffect):
 
     def output(self, f, p, g, hold, xp):
         """Return ε × f where t > t_c."""
-        (x, y, z), (a, b, c) = f, p
         begun = self.begun(hold, xp)
-        return (begun * (b * z - c * y), begun * (c * x - a * z), begun * (a * y - b * x))
+        return tuple(begun * moved for moved in cross(p, f))

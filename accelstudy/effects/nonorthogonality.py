@@ -1,6 +1,6 @@
 """Non-orthogonality: the three angles by which the sensitive axes are not at right angles."""
 
-from accelstudy.effects.base import Effect, Parameter, register
+from accelstudy.effects.base import Effect, per_axis, register
 
 
 @register
@@ -9,11 +9,7 @@ class NonOrthogonality(Effect):
 
     name = "nonorthogonality"
     family = "alignment of the axes"
-    parameters = (
-        Parameter("alpha_yz", "rad", r"$\alpha_{yz}$"),
-        Parameter("alpha_zy", "rad", r"$\alpha_{zy}$"),
-        Parameter("alpha_zx", "rad", r"$\alpha_{zx}$"),
-    )
+    parameters = per_axis("alpha", "rad", r"\alpha_{%}", ("yz", "zy", "zx"))
     equation = "upper triangle of T"
     typical = (200e-6, 0.03)
 

@@ -1,6 +1,6 @@
 """Thermal non-orthogonality: the angles between the sensitive axes depend on temperature."""
 
-from accelstudy.effects.base import Effect, Parameter, get_effect, register
+from accelstudy.effects.base import Effect, get_effect, per_axis, register
 from accelstudy.effects.components import multiply
 from accelstudy.effects.hold_conditions import REFERENCE_TEMPERATURE
 
@@ -14,11 +14,7 @@ class ThermalNonOrthogonality(Effect):
 
     name = "thermal_nonorthogonality"
     family = "temperature"
-    parameters = (
-        Parameter("alpha_T_yz", "rad/K", r"$\alpha_{T,yz}$"),
-        Parameter("alpha_T_zy", "rad/K", r"$\alpha_{T,zy}$"),
-        Parameter("alpha_T_zx", "rad/K", r"$\alpha_{T,zx}$"),
-    )
+    parameters = per_axis("alpha_T", "rad/K", r"\alpha_{T,%}", ("yz", "zy", "zx"))
     equation = "(T − T0) times the upper triangle of T"
     typical = (2e-6, 100e-6)
 
