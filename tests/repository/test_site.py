@@ -110,11 +110,15 @@ def test_each_name_of_an_exported_calibration_is_described():
     how = {"scheme": "fibonacci-24", "temperature": (10, 40), "vibration": (0, 1)}
     model = "bias-scale+thermal_bias(tau=60)+thermal_curve+vibration_rectification+warm_up"
     calibration = accelstudy.calibrate(accelstudy.simulate_campaign(**how), model=model)
-    code = calibration.export("c").split("*/", 1)[1]
+    code = accelstudy.export(calibration, form="c").split("*/", 1)[1]
     (signature,) = re.findall(r"void (accel_calibrate\(.*\))", code)
     words = set(re.findall(r"\w+", signature)) - {"const", "3"}
     names = {word.removesuffix("_60") for word in words}
-    lines = [line.split("\t") for line in calibration.export("px4").splitlines() if line[0] != "#"]
+    lines = [
+        line.split("\t")
+        for line in accelstudy.export(calibration, form="px4").splitlines()
+        if line[0] != "#"
+    ]
     first = {re.sub(r"[YZ](?=OFF|SCALE)", "X", re.sub(r"_[12]$", "_0", line[2])) for line in lines}
     said = described("file-formats")
     assert set(said["calibration.h"]) == names

@@ -18,7 +18,7 @@ from accelstudy.basics.levels import REFUTATION_LEVEL
 from accelstudy.basics.progress import say, show, warn
 from accelstudy.basics.suggestions import HERE
 from accelstudy.basics.units import GON, InputQuantity
-from accelstudy.campaign.calibration import export, wording
+from accelstudy.campaign.calibration import wording
 from accelstudy.campaign.calibration.campaign_fit import CampaignFit
 from accelstudy.campaign.calibration.document import assessed_positions, calibration_document
 from accelstudy.campaign.calibration.figures import (
@@ -172,10 +172,6 @@ class Calibration(Result):
         sigma : float in m/s² or str with a unit, of a reading
         """
         return accelstudy.apply(self, log, start=start, sigma=sigma)
-
-    def export(self, form: str = "c") -> str:
-        """Return the text of a file in a form that a device takes, as `accelstudy.export` does."""
-        return export.export(self.sensor, form)
 
     def to_frame(self) -> pd.DataFrame:
         """Return the parameters, as `parameters`."""
