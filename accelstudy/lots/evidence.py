@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from accelstudy.approaches import Approach
+from accelstudy.basics.errors import InputError
 from accelstudy.basics.wording import comma_list, words
 from accelstudy.campaign.session import Campaign
 from accelstudy.diagnosis.decision.problem import BaseFit, Problem, fit_base, pose
@@ -100,9 +101,10 @@ class Sensor:
         Raises
         ------
         InputError
-            If the positions do not determine the model, or leave no redundancy.
+            If the positions do not determine a model, or leave no redundancy.
         """
-        assert self.model is not None
+        if self.model is None:
+            raise InputError(f"{self.campaign.name}: does not determine the model")
         base = fit_base(self.measured, self.model, self.approach)
         return base if self.noise is None else replace(base, level=self.noise.level)
 

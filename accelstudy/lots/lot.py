@@ -21,6 +21,7 @@ from accelstudy.campaign.session import Campaign
 from accelstudy.diagnosis.decision.problem import BaseFit
 from accelstudy.diagnosis.evidence.noise_tests import NOISES
 from accelstudy.diagnosis.rules import RULES
+from accelstudy.effects import get_effect
 from accelstudy.lots.evidence import Sensor, SensorEvidence
 from accelstudy.lots.noise import NoisePrior, noises_of_lot
 from accelstudy.lots.passes import LEVEL, ODD, Alternative, LotEffect, Mapped, Pass, SensorState
@@ -68,7 +69,7 @@ class LotDiagnosis:
 
     def model_of(self, i: int) -> SensorModel:
         """Model of the type for a sensor, with its own times of what is sudden."""
-        return _own(self.model, self.passes, i)
+        return self.last.sensors[i].model or self.model
 
     @property
     def p_value(self) -> float:
@@ -139,61 +140,53 @@ def weigh_lot(
             new = [found for found in passes[-1].found if not known & {*found.names}]
             if not new and len(passes) > 1:
                 break
-            effects += new
-            whole = extended(whole, (found.spec for found in new if found.spec))
-            if (after := _again(passes, whole, mapped)) is None:
+            specs = [found.spec for found in new if found.spec]
+            if (after := _again(passes[-1], specs, mapped)) is None:
                 break
             passes.append(after)
+            whole, effects = extended(whole, specs), [*effects, *new]
         nameless = any(f.spec is None and f.names[0] not in NOISES for f in effects)
-        if not nameless and _explained(passes, whole, len(effects), mapped):
+        if not nameless and _explained(passes[-1], whole, len(effects), mapped):
             return LotDiagnosis(tuple(passes), whole, tuple(effects))
     close = tuple(found.names for found in effects if found.spec is not None)
     return LotDiagnosis(tuple(passes), model, close=close, explained=False)
 
 
-def _again(passes: Sequence[Pass], whole: SensorModel, mapped: Mapped) -> Pass | None:
-    """Weigh all sensors with what was found, and with the noise that they tell together.
+def _again(before: Pass, specs: Sequence[str], mapped: Mapped) -> Pass | None:
+    """Weigh all sensors with further effects, and with the noise that they tell together.
 
     None if no campaign determines the model.
 
     Parameters
     ----------
-    passes : that found it, of which each sensor has its own times of what is sudden
-    whole : SensorModel, with what was found
+    before : Pass, that found the effects
+    specs : the effects
     mapped : maps a function over the sensors
     """
-    own = [
-        replace(sensor, model=_own(whole, passes, i)) for i, sensor in enumerate(passes[0].sensors)
-    ]
+    sensors, effects = list[Sensor](), [get_effect(spec) for spec in specs]
+    for sensor, said in zip(before.sensors, before.evidence, strict=True):
+        # What is sudden happened to each sensor at a time of its own.
+        own = [said.specs.get(e.name, e.spec) if e.sudden else e.spec for e in effects]
+        model = None if sensor.model is None else extended(sensor.model, own)
+        sensors.append(replace(sensor, model=model, noise=None))
 
     def fitted(i: int, noise: NoisePrior | None = None) -> BaseFit | None:
         with suppress(InputError):
-            return replace(own[i], noise=noise).fit()
+            return replace(sensors[i], noise=noise).fit()
         return None
 
-    fits = [fitted(i) for i in range(len(own))]
+    fits = [fitted(i) for i in range(len(sensors))]
     noises = noises_of_lot(fits, lambda i, sigma: fitted(i, NoisePrior(sigma, RULES.freedom_given)))
-    sensors = list[Sensor]()
     for i, noise in enumerate(noises):
         fit = fits[i] if noise is None else fitted(i, noise)
         # A campaign that does not determine the model says nothing of what else is missing.
         known = None if fit is None else fit.solution.model
-        sensors.append(replace(own[i], model=known, noise=noise))
+        sensors[i] = replace(sensors[i], model=known, noise=noise)
     return Pass.of(sensors, mapped) if any(one.model for one in sensors) else None
 
 
-def _own(whole: SensorModel, passes: Sequence[Pass], i: int) -> SensorModel:
-    """Model of a sensor: what is sudden happened when the last pass that looked for it says."""
-    specs: dict[str, str] = {}
-    for one in passes:
-        specs |= one.evidence[i].specs
-    effects = [specs.get(e.name, e.spec) if e.sudden else e.spec for e in whole.effects]
-    return compose(whole.name, tuple(effects))
-
-
-def _explained(passes: Sequence[Pass], whole: SensorModel, known: int, mapped: Mapped) -> bool:
+def _explained(now: Pass, whole: SensorModel, known: int, mapped: Mapped) -> bool:
     """Whether what was found explains the lot, with the most probable of what is not sure."""
-    now = passes[-1]
     while now.p_value_of_usual < LEVEL_OF_REST:
         best = next(iter(now.given))
         if best in NOISES or {effect.name for effect in whole.effects} & {*now.classes[best]}:
@@ -202,7 +195,7 @@ def _explained(passes: Sequence[Pass], whole: SensorModel, known: int, mapped: M
         if spec is None or known >= MAX_PASSES:
             return False
         whole, known = extended(whole, [spec]), known + 1
-        if (after := _again(passes, whole, mapped)) is None:
+        if (after := _again(now, [spec], mapped)) is None:
             return False
         now = after
     return True
