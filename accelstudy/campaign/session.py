@@ -5,9 +5,10 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from functools import cached_property
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
+import pandas as pd
 from numpy.typing import NDArray
 
 from accelstudy.basics.errors import InputError
@@ -17,9 +18,6 @@ from accelstudy.campaign.header import Header
 from accelstudy.campaign.sensor_type import SensorType
 from accelstudy.effects import HoldConditions
 from accelstudy.files.validation import validate
-
-if TYPE_CHECKING:
-    import pandas as pd
 
 Array = NDArray[np.float64]
 
@@ -226,6 +224,7 @@ class Campaign:
             the columns out
         """
         holds = {name: self.holds[name].to_numpy() for name in self.holds}
+        holds["position"] = self.holds.index.to_numpy()
         for attribute, values in arrays.items():
             if values is None:
                 for name in COLUMNS[attribute].names:
@@ -235,7 +234,8 @@ class Campaign:
                 whole = np.array(holds.get(name, np.full(len(self.holds), np.nan)))
                 whole[self.used] = column
                 holds[name] = whole
-        return replace(self, holds=type(self.holds)(holds, self.holds.index))
+        index = pd.Index(holds.pop("position"), name="position")
+        return replace(self, holds=pd.DataFrame(holds, index))
 
     def with_sigma(self, sigma_force: float | None) -> Campaign:
         """Return the campaign with a noise of a position mean, m/s², that is known; None is not."""
