@@ -7,7 +7,6 @@ wherever the calibration holds.
 from __future__ import annotations
 
 from collections.abc import Mapping
-from functools import cache
 from itertools import islice
 from typing import Any
 
@@ -21,14 +20,12 @@ from accelstudy.campaign.calibration.sensor_calibration import (
     RANGE_MARGIN,
     SensorCalibration,
 )
-from accelstudy.effects import get_effect
-from accelstudy.effects.base import expressions
 from accelstudy.effects.components import AXES
 from accelstudy.effects.hold_symbols import HoldSymbols
 from accelstudy.pages import render_text
 from accelstudy.positions.points import evenly_spread
 from accelstudy.symbolic.algebra import sp
-from accelstudy.symbolic.tracing import derivative, symbols
+from accelstudy.symbolic.tracing import derivative, symbolic, symbols
 
 Array = NDArray[np.float64]
 
@@ -101,21 +98,39 @@ def c_header(calibration: SensorCalibration, real: str = "float") -> str:
     )
 
 
+class _DeviceConditions(HoldSymbols):
+    """What a device knows besides the reading, by its names in C.
+
+    Attributes
+    ----------
+    drifts : bool, whether the effect that takes them ends with the calibration session
+    """
+
+    drifts = False
+
+    @property
+    def time(self) -> sp.Symbol:
+        """Time since the start of the session."""
+        return symbols(SESSION_TIME)[0] if self.drifts else self.columns["time"]
+
+    def lagged(self, tau: Any) -> sp.Symbol:
+        """Temperature behind a lag; with a lag of 0 the temperature itself."""
+        name = f"{LAGGED_TEMPERATURE}{float(tau):g}".replace(".", "_")
+        return symbols(name)[0] if tau else self.columns["temperature"]
+
+
 def _output(calibration: SensorCalibration) -> tuple[Any, Any]:
     """Output (3, 1) for a force in the sensitive axes, and its derivative by the force (3, 3)."""
-    model, force = calibration.model, symbols(*FORCE)
-    output, slope = sp.Matrix(force), sp.eye(3)
+    p, g = tuple(map(sp.Float, calibration.parameters)), sp.Float(calibration.gravity)
+    hold = _DeviceConditions()
+    output: Any = sp.Matrix(symbols(*FORCE))
     for last in (False, True):  # those that act last take what all others leave
-        added, slopes = sp.zeros(3, 1), sp.eye(3)
-        for effect in model.effects:
+        force = tuple(output)
+        for effect, columns in calibration.model.parts:
             if effect.last == last:
-                formula, by_force = _formulas(effect.spec)
-                added, slopes = added + formula, slopes + by_force
-        at = dict(zip(force, output, strict=True))
-        output, slope = output + added.xreplace(at), slopes.xreplace(at) * slope
-    names, values = (*model.parameter_names, "g"), [*calibration.parameters, calibration.gravity]
-    numbers = dict(zip(symbols(*names), map(sp.Float, values), strict=True))
-    return output.xreplace(numbers), slope.xreplace(numbers)
+                hold.drifts = effect.drifts
+                output += sp.Matrix(effect.output(force, p[columns], g, hold, symbolic))
+    return output, derivative(output, symbols(*FORCE))
 
 
 def _steps(calibration: SensorCalibration) -> int:
@@ -137,19 +152,6 @@ def _steps(calibration: SensorCalibration) -> int:
     if not solved.any():
         raise InputError(f"the model {model.name!r} with these parameters has no inverse")
     return 1 + int(np.argmax((np.array(sizes)[:, solved] < MAX_SOLUTION_ERROR).all(axis=1)))
-
-
-@cache
-def _formulas(spec: str) -> tuple[Any, Any]:
-    """What an effect adds to the output, (3, 1), and its derivative by the force, (3, 3)."""
-    effect, hold = get_effect(spec), HoldSymbols()
-    output, _, _ = expressions(effect, hold)
-    lags = [f"{LAGGED_TEMPERATURE}{float(tau):g}".replace(".", "_") for tau in hold.lagged_by]
-    names = dict(zip(hold.lagged_by.values(), symbols(*lags), strict=True))
-    if effect.drifts:
-        names[hold.time] = symbols(SESSION_TIME)[0]
-    added = sp.Matrix(output).xreplace(names)
-    return added, derivative(added, symbols(*FORCE))
 
 
 def _entries(name: str, vector: Any) -> dict[str, Any]:
