@@ -169,7 +169,7 @@ class SensorModel:
         -------
         f_s : (..., n, 3) array, m/s²
         """
-        return self._apply(self.trace.sense, f_b, parameters, g, hold)
+        return self._evaluate(self.trace.sense, f_b, parameters, g, hold)[..., 0]
 
     def correct(
         self,
@@ -184,7 +184,7 @@ class SensorModel:
         does not converge (effects as large as the signal) the result is NaN.
         """
         f_a = self.sensitive_force(f_s, parameters, g, hold)
-        return self._apply(self.trace.body, f_a, parameters, g, hold)
+        return self._evaluate(self.trace.body, f_a, parameters, g, hold)[..., 0]
 
     def correction_jacobian(
         self,
@@ -194,7 +194,8 @@ class SensorModel:
         hold: HoldConditions | None = None,
     ) -> NDArray[np.float64]:
         """Derivative of `correct` with respect to the parameters, (..., n, 3, u)."""
-        return self._corrected_by(self.trace.body_jacobian, f_s, parameters, g, hold)
+        f_a = self.sensitive_force(f_s, parameters, g, hold)
+        return self._evaluate(self.trace.body_jacobian, f_a, parameters, g, hold)
 
     def output_jacobian(
         self,
@@ -204,22 +205,8 @@ class SensorModel:
         hold: HoldConditions | None = None,
     ) -> NDArray[np.float64]:
         """Derivative of `correct` with respect to the sensor's output, (..., n, 3, 3)."""
-        return self._corrected_by(self.trace.output_jacobian, f_s, parameters, g, hold)
-
-    def _corrected_by(
-        self,
-        derivatives: TracedFunction,
-        f_s: ArrayLike,
-        parameters: ArrayLike,
-        g: ArrayLike,
-        hold: HoldConditions | None,
-    ) -> NDArray[np.float64]:
-        f_a = np.moveaxis(self.sensitive_force(f_s, parameters, g, hold), -1, 0)
-        x = np.moveaxis(np.asarray(parameters, dtype=float), -1, 0)
-        jacobian = self.trace.evaluate(
-            derivatives, f_a, f_a, x, self.settings, np.asarray(g, dtype=float), hold
-        )
-        return np.moveaxis(jacobian, (0, 1), (-2, -1))
+        f_a = self.sensitive_force(f_s, parameters, g, hold)
+        return self._evaluate(self.trace.output_jacobian, f_a, parameters, g, hold)
 
     def sensitive_force(
         self,
@@ -251,7 +238,7 @@ class SensorModel:
         batch = np.broadcast_shapes(f_s.shape[:-2], np.shape(parameters)[:-1])
         f_a = np.broadcast_to(f_s, batch + f_s.shape[-2:])
         while True:
-            step = self._apply(self.trace.newton_step, f_a, parameters, g, hold, f_s)
+            step = self._evaluate(self.trace.newton_step, f_a, parameters, g, hold, f_s)[..., 0]
             f_a = f_a + step
             yield f_a, step
 
@@ -262,14 +249,12 @@ class SensorModel:
 
         Parameters (u,) as in `sense`, with the force f_a (..., n, 3) in the sensitive axes.
         """
-        f, x = _components(f_a), np.asarray(parameters, dtype=float)
-        g = np.asarray(STANDARD_GRAVITY)
-        slope = self.trace.evaluate(self.trace.by_last, f, f, x, self.settings, g, hold)
-        return np.moveaxis(slope, (0, 1), (-2, -1))
+        return self._evaluate(self.trace.by_last, f_a, parameters, STANDARD_GRAVITY, hold)
 
     def axes_matrix(self, parameters: ArrayLike) -> NDArray[np.float64]:
         """Return T, (3, 3), which turns forces in the sensitive axes into the body frame."""
-        return self._apply(self.trace.body, np.eye(3), parameters, STANDARD_GRAVITY, None).T
+        body = self._evaluate(self.trace.body, np.eye(3), parameters, STANDARD_GRAVITY, None)
+        return body[..., 0].T
 
     def reading_errors(
         self, angles: ArrayLike, parameters: ArrayLike, hold: HoldConditions | None = None
@@ -307,9 +292,10 @@ class SensorModel:
     ) -> NDArray[np.float64]:
         """Return the errors (..., n, 2) of a reading (..., n, 2); see `reading_errors`."""
         padded = np.concatenate([reading, np.zeros_like(reading[..., :1])], axis=-1)
-        return self._apply(self.trace.reading, padded, parameters, STANDARD_GRAVITY, hold)
+        errors = self._evaluate(self.trace.reading, padded, parameters, STANDARD_GRAVITY, hold)
+        return errors[..., 0]
 
-    def _apply(
+    def _evaluate(
         self,
         function: TracedFunction,
         force: ArrayLike,
@@ -318,13 +304,12 @@ class SensorModel:
         hold: HoldConditions | None,
         output: ArrayLike | None = None,
     ) -> NDArray[np.float64]:
-        """Call a function of the trace, of vectors, components last: (..., n, 3) in and out."""
+        """Call a function of the trace, components last; returns (..., n, rows, columns)."""
         force = _components(force)
         output = force if output is None else _components(output)
-        parameters = _components(parameters)
-        g = np.asarray(g, dtype=float)
-        result = self.trace.evaluate(function, force, output, parameters, self.settings, g, hold)
-        return result[:, 0].transpose(*range(1, result.ndim - 1), 0)
+        x, g = _components(parameters), np.asarray(g, dtype=float)
+        result = self.trace.evaluate(function, force, output, x, self.settings, g, hold)
+        return result.transpose(*range(2, result.ndim), 0, 1)
 
 
 def _components(vectors: ArrayLike) -> NDArray[np.float64]:
