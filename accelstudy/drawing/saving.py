@@ -6,7 +6,6 @@ import html
 from collections.abc import Callable, Mapping
 from pathlib import Path
 
-import matplotlib as mpl
 import numpy as np
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.backends.backend_svg import FigureCanvasSVG
@@ -15,7 +14,7 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
 from accelstudy.basics.progress import failure
-from accelstudy.drawing.style import STYLE
+from accelstudy.drawing.style import in_style
 from accelstudy.files.outputs import whole_file
 
 PAGE_DPI = 150
@@ -39,7 +38,7 @@ def save(figure: Figure, path: str | Path, title: str, dpi: int) -> None:
     title : str, for the metadata
     dpi : int, of a PNG
     """
-    with mpl.rc_context(STYLE), whole_file(path) as part:  # type: ignore[arg-type]
+    with in_style(), whole_file(path) as part:
         if Path(path).suffix == ".svg":
             metadata = {"Date": None, "Creator": None, "Title": title}
             FigureCanvasSVG(figure).print_svg(part, metadata=metadata)  # type: ignore[no-untyped-call]
@@ -70,7 +69,7 @@ def save_all(figures: Mapping[str, Callable[[], Figure]], folder: Path) -> dict[
 def _element(draw: Callable[[], Figure], folder: Path, name: str) -> str:
     """Return the element of one figure, or what is said in its place."""
     try:
-        with mpl.rc_context(STYLE):  # type: ignore[arg-type]
+        with in_style():
             figure = draw()
         _simplify(figure)
         for kind in ("svg", "png"):

@@ -7,7 +7,9 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterable, Sequence
+from contextlib import AbstractContextManager
 from functools import cache
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -35,40 +37,6 @@ DPI = 300
 
 Style = dict[str, Any]
 """Keyword arguments of an artist."""
-
-STYLE: Style = {
-    "axes.grid": True,
-    "axes.axisbelow": True,
-    "axes.labelsize": 8,
-    "axes.linewidth": 0.6,
-    "axes.spines.right": False,
-    "axes.spines.top": False,
-    "axes.titlesize": 8,
-    "axes.titley": 1,
-    "figure.constrained_layout.h_pad": 0.03,
-    "figure.constrained_layout.w_pad": 0.03,
-    "figure.labelsize": 8,
-    "figure.titlesize": 9,
-    "font.family": "DejaVu Sans",
-    "font.size": 8,
-    "grid.color": "#DDDDDD",
-    "grid.linewidth": 0.5,
-    "hatch.color": "#999999",
-    "hatch.linewidth": 0.5,
-    "legend.fontsize": 7.5,
-    "legend.frameon": False,
-    "lines.linewidth": 1.2,
-    "lines.markersize": 4,
-    "mathtext.default": "it",
-    "mathtext.fontset": "dejavusans",
-    "savefig.facecolor": "white",
-    "svg.fonttype": "path",
-    "svg.hashsalt": "accelstudy",
-    "xtick.labelsize": 7.5,
-    "xtick.major.width": 0.6,
-    "ytick.labelsize": 7.5,
-    "ytick.major.width": 0.6,
-}
 
 INK = "#222222"
 MISSING = "#E6E6E6"
@@ -100,6 +68,14 @@ CAUSES = {
 
 TITLES = {"bias-scale": "6: bias, scale", NINE: "9: + non-orthogonality"}
 """Short titles of models; others are named by what they add to these."""
+
+
+def in_style() -> AbstractContextManager[None]:
+    """Draw in the look of all figures, as `figures.mplstyle` has it, within a ``with`` block."""
+    import matplotlib as mpl
+
+    sheet = Path(__file__).with_name("figures.mplstyle")
+    return mpl.rc_context(mpl.rc_params_from_file(sheet, use_default_template=False))
 
 
 def approach_colour(approach: str) -> str:
@@ -220,9 +196,10 @@ def log_ticks(axis: Axis, low: float, high: float, *, few: bool = False) -> None
 
 def legend_columns(labels: Iterable[str], width: float = FULL) -> int:
     """Number of columns of a legend that fit the width of a figure, inches."""
+    import matplotlib as mpl
     from matplotlib.textpath import TextPath
 
-    size = STYLE["legend.fontsize"]
+    size = mpl.rcParams["legend.fontsize"]
     # Handle and spaces take about as much as seven letters m.
     extents = [TextPath((0, 0), label, size=size).get_extents().width for label in labels]
     columns = [extent + 7 * size for extent in extents]

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any, ClassVar
 
 from accelstudy.basics.arguments import path_of
 from accelstudy.basics.progress import say, show
-from accelstudy.drawing.style import FULL, MM, STYLE
+from accelstudy.drawing.style import FULL, MM, in_style
 from accelstudy.files.documents import Document
 from accelstudy.files.outputs import OutputKind, new_file
 from accelstudy.pages.notebook import notebook_html
@@ -72,8 +72,6 @@ class Result(ABC):
 
     def plot(self, ax: Axes | None = None) -> Axes:
         """Draw the main figure into given axes, or into new ones, and return them."""
-        import matplotlib as mpl
-
         figure = None
         if ax is None:
             from matplotlib import pyplot
@@ -81,7 +79,7 @@ class Result(ABC):
             # A notebook gets ready to show figures at its first one; the style would undo that.
             size = self.size[0], self.size[1] * MM
             figure = pyplot.figure(figsize=size, layout="constrained")
-        with mpl.rc_context(STYLE):  # type: ignore[arg-type]
+        with in_style():
             ax = figure.add_subplot() if ax is None and figure else ax
             assert ax is not None
             self.draw(ax)

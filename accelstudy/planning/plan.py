@@ -182,10 +182,8 @@ class Plan(Result):
     def write(self, folder: Path, place: Path) -> None:
         """Write what `accelstudy plan` does; raises `InputError` if nothing is reached."""
         # Slow to import, and not needed for what is printed.
-        import matplotlib as mpl
-
         from accelstudy.drawing.saving import save
-        from accelstudy.drawing.style import DPI, STYLE, new_figure
+        from accelstudy.drawing.style import DPI, in_style, new_figure
         from accelstudy.planning.design import write_scheme
 
         if not self.ranked:
@@ -196,7 +194,7 @@ class Plan(Result):
             directions = directions[field_order(first.search.task, directions)]
         origin = f"accelstudy plan, seed {self.seed}", directions, {"made_by": "accelstudy plan"}
         write_scheme(folder / "positions.yaml", "plan", "of plan", *origin)
-        with mpl.rc_context(STYLE):  # type: ignore[arg-type]
+        with in_style():
             figure = new_figure(*self.size)
             self.draw(figure.subplots())
         for name in ("plan.svg", "plan.png"):

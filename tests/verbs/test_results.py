@@ -22,7 +22,7 @@ from places import ROOT
 from scipy import stats
 
 import accelstudy as acs
-from accelstudy.drawing.style import STYLE
+from accelstudy.drawing.style import in_style
 from accelstudy.schemes import get_scheme
 
 matplotlib.use("agg")
@@ -131,7 +131,8 @@ def test_a_result_says_shows_and_draws_itself_and_is_equal_to_itself_alone(every
         ax = one.plot()
         assert matplotlib.is_interactive()
     sizes = {label.get_fontsize() for label in ax.get_xticklabels()}
-    assert sizes == {STYLE["xtick.labelsize"]}  # the style of all figures
+    with in_style():
+        assert sizes == {matplotlib.rcParams["xtick.labelsize"]}
     assert not ax.spines["top"].get_visible()
     pyplot.close(ax.figure)
 

@@ -107,9 +107,7 @@ def draw(name: str, tables: Tables, study: Study) -> Figure:
     tables : mapping of table name to table, at least those that the figure draws
     study : Study
     """
-    import matplotlib as mpl
-
-    with mpl.rc_context(style.STYLE), angles_in(study.angle_unit):  # type: ignore[arg-type]
+    with style.in_style(), angles_in(study.angle_unit):
         return get_figure(name).draw(tables, study)
 
 
