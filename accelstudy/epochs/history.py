@@ -200,9 +200,8 @@ class History(Result):
         for k, parameter in enumerate(self.model.parameters):
             course = self.courses[k] if self.courses else None
             values, sigmas = self.estimates[:, k], self.sigmas[:, k]
-            found, instead = tuple[str, ...](), tuple[int, ...]()
-            if k in changed:
-                found, instead = course.found if course else ("changed",), self.change.instead_of(k)
+            found = course.found if course else ("changed",)
+            instead = self.change.instead_of(k) if k in changed else ()
             entry = {
                 "name": parameter.name,
                 "unit": parameter.unit,
@@ -211,7 +210,7 @@ class History(Result):
                 "change": values[-1] - values[0],
                 "sigma": np.hypot(sigmas[0], sigmas[-1]),
                 "detectable": detectable[k],
-                "found": found,
+                "found": found if k in changed else (),
                 "or": [names[i] for i in instead],
                 "rate": course and course.rate,
                 "scatter": course and course.scatter,

@@ -39,6 +39,8 @@ FALSE_ODD = 0.05
 """False discovery rate of odd sensors."""
 MAX_ODD_SHARE = 0.1
 """Share of the sensors up to which an effect makes them odd, and does not belong to the type."""
+MIN_PROBABILITY = float(np.finfo(float).tiny)
+"""Least p-value of which the logarithm is taken."""
 MIN_RIVAL = 0.02
 """Least posterior probability of a name that is reported with others."""
 MIN_CERTAIN = 0.95
@@ -193,7 +195,8 @@ class Pass:
         Fisher's combination of their p-values finds what many have, Tippett's what a single one
         has. The smallest of the tests counts for all.
         """
-        each = [one.p_value for one in evidence]
+        # Beyond the smallest number a probability is 0; without a sensor there is nothing.
+        each = [max(one.p_value, MIN_PROBABILITY) for one in evidence] or [1.0]
         tests = [stats.combine_pvalues(each, how).pvalue for how in ("fisher", "tippett")]
         tests += [] if self.mean is None else [self.mean.detection.p_value]
         return float(min(len(tests) * min(tests), 1.0))

@@ -219,6 +219,12 @@ def test_nothing_missing_is_called_so_at_one_level():
         assert np.mean(np.array(p) < level) == pytest.approx(level, abs=STANDARD_ERRORS * sigma)
 
 
+def test_a_campaign_may_be_impossible_and_all_may_be_odd():
+    one = Pass((None,) * 2, (SensorEvidence("a", 0.0), SensorEvidence("b", 1.0)))
+    assert one.p_value < 1e-300
+    assert Pass((), ()).p_value == 1.0
+
+
 def test_what_the_lot_lacks_is_named_and_what_one_sensor_lacks_makes_it_odd():
     rng = np.random.default_rng(5)
     lacks = np.zeros((20, 3))
