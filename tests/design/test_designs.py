@@ -131,26 +131,6 @@ def test_a_job_needs_no_file(tmp_path, monkeypatch):
     assert make_study().cells[0].directions is None  # of schemes that come along
 
 
-@pytest.mark.parametrize(
-    ("text", "wrong"),
-    {"": "not a mapping", "scheme: a\n": "directions: must be given",
-     "directions: [[1, 2]]\n": r"directions\.0: must have at least 3 entries",
-     "directions: [[0, 0, 1], [0, 0, 0]]\n": r"directions\.1: must not be zero",
-     f"directions: [[0, 0, {10**400}]]\n": r"directions\.0\.2: must be",
-     "direction: [[0, 0, 1]]\n": "direction: unknown key; did you mean 'directions'",
-     "scheme: a/b\ndirections: [[0, 0, 1]]\n": "scheme: 'a/b' cannot be",
-     "scheme: 3\ndirections: [[0, 0, 1]]\n": "scheme: must be a text"}.items(),
-)  # fmt: skip
-def test_a_file_that_is_no_scheme(tmp_path, text, wrong):
-    path = tmp_path / "bad.yaml"
-    path.write_text(text)
-    with pytest.raises(InputError, match=wrong) as error:
-        get_scheme(str(path))
-    assert str(error.value).startswith(str(path))
-    with pytest.raises(InputError, match=r"config: grids.0.schemes.*bad.yaml"):
-        study(path)
-
-
 def asked(**given):
     """Search by the keywords of a design."""
     usual = {name: p.default for name, p in signature(find_positions).parameters.items()}

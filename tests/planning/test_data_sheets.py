@@ -5,7 +5,7 @@ import math
 
 import numpy as np
 import pytest
-from calling import refusal, refused, succeed
+from calling import refusal, succeed
 
 from accelstudy.basics.errors import InputError
 from accelstudy.basics.units import STANDARD_GRAVITY
@@ -101,23 +101,6 @@ def test_a_nonlinearity_is_taken_as_a_parabola_or_a_cubic_of_the_same_deviation(
         curve = np.polynomial.Polynomial([0] * power + [size], domain=[-2, 2], window=[-2, 2])
         left = curve.convert(kind=np.polynomial.Chebyshev, domain=[-2, 2]).coef[power]
         assert left == pytest.approx(0.01)
-
-
-@pytest.mark.parametrize(("content", "message"), [
-    ({}, "noise is missing"),
-    ({"noise_density": 5}, "noise_density: expected a number with its unit"),
-    ({"noise_density": "5 mgon"}, "noise_density: '5 mgon': the unit must be one of"),
-    ({"noise_density": "-5 ug/sqrt(Hz)"}, "noise_density: '-5 ug/sqrt(Hz)': must be"),
-    ({"noise_density": {"value": "5 ug/sqrt(Hz)", "page": 3}}, "noise_density: page: unknown key"),
-    ({"noise_density": ["5 ug/sqrt(Hz)"]}, "value: must be a text, not ["),
-    ({"noise": "5 ug/sqrt(Hz)"}, "unknown key 'noise'"),
-    ({"position_sigma": "2 mm/s2", "noise_density": "5 ug/sqrt(Hz)"}, "give one of them"),
-    ({"position_sigma": "2 mm/s2", "nonlinearity": "1%"}, "full_scale: missing"),
-    ({"position_sigma": "2 mm/s2", "scale_per_kelvin": "1e200 ppm/K"}, "at most 1e+06 ppm/K"),
-])  # fmt: skip
-def test_what_is_no_data_sheet_ends_with_one_line(content, message):
-    with refused("mine", message):
-        parse_data_sheet(content, "mine")
 
 
 def test_a_users_file_is_read_and_an_unknown_sensor_names_those_there_are(tmp_path):
