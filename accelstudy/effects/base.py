@@ -271,21 +271,15 @@ def get_effect(spec: str) -> Effect:
     return effect.with_parameters(tuple(i for i, name in enumerate(names) if name in wanted))
 
 
-def expressions(
-    effect: Effect, hold: HoldSymbols | None = None
-) -> tuple[tuple[Any, ...], Matrix, tuple[Any, Any]]:
-    """Evaluate an effect with symbols for all but its settings, which stay numbers.
-
-    Effects that are evaluated with the same `hold` share its symbols.
-    """
+def expressions(effect: Effect) -> tuple[tuple[Any, ...], Matrix, tuple[Any, Any]]:
+    """Evaluate an effect with symbols for all but its settings, which stay numbers."""
     numbered = type(effect)()
     numbered.settings = {
         name: sp.Integer(int(value)) if float(value).is_integer() else sp.Float(value)
         for name, value in effect.settings.items()
     }
     p = symbols(*(parameter.name for parameter in effect.parameters))
-    f, (g,) = symbols(*(f"f_{axis}" for axis in AXES)), symbols("g")
-    hold = hold or HoldSymbols()
+    f, (g,), hold = symbols(*(f"f_{axis}" for axis in AXES)), symbols("g"), HoldSymbols()
     return (
         numbered.output(f, p, g, hold, symbolic),
         numbered.axes(p, symbolic),
