@@ -14,15 +14,10 @@ from numpy.typing import NDArray
 from accelstudy.basics.errors import InputError, key
 from accelstudy.basics.units import GON
 from accelstudy.campaign.gross_errors.recognition import check_size
-from accelstudy.campaign.importing.holds import (
-    MAX_WANDER,
-    Holds,
-    reaches_range,
-    scatter,
-    windows_at_rest,
-)
+from accelstudy.campaign.importing.holds import MAX_WANDER, Holds, reaches_range, scatter
 from accelstudy.campaign.importing.log import Log, join, read_log
 from accelstudy.campaign.importing.noise import hold_noise, sigma_text
+from accelstudy.campaign.importing.windows import windows_at_rest
 from accelstudy.campaign.reference import ReferenceSensor
 from accelstudy.leveling.angles import angles_of, near_pole
 from accelstudy.sensors.frames import Frame

@@ -129,3 +129,11 @@ def test_short_rests_are_counted_with_the_option_that_takes_them(tmp_path):
     option = result.stderr.split("--shortest ")[1].split()[0]
     assert "(12 positions)" in succeed(*words, "--shortest", option).stdout
     assert "(12 positions)" in succeed(*words, "--window", 0.5).stdout
+
+
+def test_positions_in_whole_g_that_fit_to_the_last_digit_end_in_one_line():
+    held = np.eye(3)[[0, 1, 2, 0, 1, 2, 1]] * np.array([1, 1, 1, -1, -1, -1, 1])[:, None]
+    campaign = acs.find_holds(table(np.repeat(held, 40, axis=0)), block=40, unit="g", threshold=50)
+    assert campaign.sigma_force is None
+    with refused("fit the model 'bias' to the last digit", "too coarse", "sensor_noise.sigma_mps2"):
+        acs.calibrate(campaign, model="bias")

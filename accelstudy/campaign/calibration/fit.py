@@ -37,6 +37,8 @@ not converge."""
 
 UNIT_SIGMA = 1e-3
 """m/s², in place of an unknown sigma; only sigmas a posteriori have a meaning then."""
+LEAST_SCATTER = 1e-18
+"""m/s²; smaller residuals are no rounding, but all zero."""
 CHEAP_SIGMA = 1e-2
 """m/s², of the means of a cheap sensor: what positions must determine a model by where neither the
 campaign nor residuals tell the noise."""
@@ -151,6 +153,12 @@ def fit_campaign(
             if adjustment.converged[0]:
                 fit = replace(fit, observed=observed, adjustment=adjustment)
     blur = sigma_to_show_above(campaign)
+    if campaign.sigma_force is None and 0 <= fit.sigma_position_posteriori < LEAST_SCATTER:
+        raise InputError(
+            f"{campaign.name}: the positions fit the model {model.name!r} to the last digit, as of "
+            "readings in steps that are too coarse, so nothing tells their noise; state it "
+            "(sensor_noise.sigma_mps2)"
+        )
     if adjustment.redundancy > 0:
         # A stated noise may be too large; where residuals are larger, an effect may be missing.
         seen = fit.sigma_position

@@ -17,10 +17,11 @@ from accelstudy.basics.units import MGON, UNITS, display_unit, to_display
 from accelstudy.campaign.gross_errors.recognition import check_plausible
 from accelstudy.campaign.header import LogLayout
 from accelstudy.campaign.importing.columns import ANGLES, MEANS, SDS, thermometers
-from accelstudy.campaign.importing.holds import Holds, find_blocks, find_holds, usual_window
+from accelstudy.campaign.importing.holds import Holds, find_blocks, find_holds
 from accelstudy.campaign.importing.log import AnyLog, Log, join, read_log
 from accelstudy.campaign.importing.noise import sigma_text, steps_text
 from accelstudy.campaign.importing.settings import ImportSettings
+from accelstudy.campaign.importing.windows import usual_window
 from accelstudy.campaign.session import Campaign
 
 if TYPE_CHECKING:

@@ -84,11 +84,9 @@ def _envelope(holds: Holds) -> tuple[Array, Array, Array]:
     firsts = np.searchsorted(time, edges[:-1])
     filled = np.diff(firsts, append=len(time)) > 0
     low, high = np.full((2, count, 4), np.nan)
-    for i, values in enumerate([*holds.log.forces.T, holds.windows.variance]):
-        for ends, end_of in ((low, np.fmin), (high, np.fmax)):
-            ends[filled, i] = end_of.reduceat(values, firsts[filled])
-    for ends in (low, high):
-        ends[:, 3] **= 0.5
+    for i, values in enumerate([*holds.log.forces.T, np.sqrt(holds.windows.variance)]):
+        low[filled, i] = np.fmin.reduceat(values, firsts[filled])
+        high[filled, i] = np.fmax.reduceat(values, firsts[filled])
     return edges, low, high
 
 
