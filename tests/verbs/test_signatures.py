@@ -146,7 +146,7 @@ def test_keywords_of_an_import_are_the_keys_of_its_settings() -> None:
         ("rate_hz", 50, "rate_hz: no longer a key; write rate instead"),
         ("window_s", 2, "window_s: no longer a key; write window instead"),
         ("robot", {"angle_sigma_mgon": 3}, "robot: no longer a key; write robot_sigma, as 3.2mgon"),
-        ("gravity", {"value_mps2": 9.81}, "gravity: no longer a section; write its value"),
+        ("gravity", {"value_mps2": 9.81}, "gravity: must be a number, not "),
     ):
         with pytest.raises(accelstudy.InputError, match=f"^mine.yaml: {said}"):
             validate(ImportSettings, {old: value}, "mine.yaml")
