@@ -10,6 +10,7 @@ from typing import Annotated, Any, ClassVar, TypeVar
 
 from pydantic import (
     AfterValidator,
+    AliasChoices,
     BaseModel,
     BeforeValidator,
     ConfigDict,
@@ -159,11 +160,14 @@ class ConfigSection(BaseModel):
     @model_validator(mode="before")
     @classmethod
     def _check_keys(cls, content: Any) -> Any:
-        known = [field.alias or name for name, field in cls.model_fields.items()]
+        fields = cls.model_fields
+        known = [field.alias or name for name, field in fields.items()]
+        other = [field.validation_alias for field in fields.values()]
+        before = [name for one in other if isinstance(one, AliasChoices) for name in one.choices]
         for key in content if isinstance(content, Mapping) else ():
             if key in cls.retired:
                 raise KeyProblem(f"{key}: no longer a key; {cls.retired[key]}")
-            if isinstance(key, str) and key not in (*known, *cls.model_fields):
+            if isinstance(key, str) and key not in (*known, *fields, *before):
                 near = get_close_matches(key[:100], known, n=1)
                 hint = f"; did you mean {near[0]!r}?" if near else ""
                 raise KeyProblem(f"{key[:100]}: unknown key{hint} (known: {', '.join(known)})")

@@ -9,7 +9,7 @@ from calling import refused
 
 from accelstudy.basics.errors import InputError
 from accelstudy.campaign.calibration.sensor_calibration import read_calibration
-from accelstudy.campaign.importing.raw_table import read_table
+from accelstudy.campaign.importing.formats import read_table
 from accelstudy.files import reading
 from accelstudy.files.reading import read_layer
 from accelstudy.files.tables import open_parquet

@@ -13,7 +13,7 @@ from recorded import EPOCH, message, ulog, write_bag, write_ulog
 
 import accelstudy as acs
 from accelstudy.basics.units import STANDARD_GRAVITY as G
-from accelstudy.campaign.importing.raw_table import read_table
+from accelstudy.campaign.importing.formats import read_table
 from accelstudy.campaign.importing.windows import window_variance
 
 TIME, FORCES = by_hand()

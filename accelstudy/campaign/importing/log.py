@@ -26,7 +26,8 @@ from accelstudy.campaign.importing.columns import (
     resolve_layout,
     which_column,
 )
-from accelstudy.campaign.importing.raw_table import RawTable, read_table, table_in_memory
+from accelstudy.campaign.importing.formats import read_table, table_in_memory
+from accelstudy.campaign.importing.raw_table import RawTable
 from accelstudy.sensors.conversion import MAX_VALUE
 
 Array = NDArray[np.float64]
