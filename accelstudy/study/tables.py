@@ -81,8 +81,7 @@ def simulate_cells(
     outputs : paths of `estimates` and of each of `TABLES`
     provenance : see `accelstudy.files.tables.origin`; its seed is that of the study
     """
-    measured = ("estimate", "linear_estimate", "sigma_priori")
-    with table_writer(outputs["estimates"], ESTIMATES, provenance, measured) as write:
+    with table_writer(outputs["estimates"], ESTIMATES, provenance) as write:
         tables = simulated_tables(cells, provenance["seed"], write)
     for name in TABLES:
         write_table(outputs[name], tables[name], provenance)

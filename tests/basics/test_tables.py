@@ -21,7 +21,7 @@ def write_at_once(path):
 
 def write_in_groups(path):
     content = pa.Table.from_pandas(TABLE, preserve_index=False)
-    with table_writer(path, content.schema, PROVENANCE, measured=["value"]) as write:
+    with table_writer(path, content.schema, PROVENANCE) as write:
         write(content[:300])
         write(content[300:])
 
