@@ -39,14 +39,10 @@ class Registry(Generic[Item]):
         self._items: dict[str, Item] = {}
         self._unlisted: frozenset[str] = frozenset()
 
-    def check_free(self, name: str) -> None:
-        """Raise `InputError` if the name is taken."""
-        if name in self._items:
-            raise InputError(f"the {self.kind} {name!r} is there already; choose another name")
-
     def add(self, name: str, item: Item) -> None:
         """Register an item; raise `InputError` if its name is taken."""
-        self.check_free(name)
+        if name in self._items:
+            raise InputError(f"the {self.kind} {name!r} is there already; choose another name")
         if plugins.note_registration(self.kind, name) and self._check:
             self._check(item)
         self._items[name] = item

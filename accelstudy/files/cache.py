@@ -12,8 +12,9 @@ import os
 import stat
 from collections.abc import Callable
 from pathlib import Path
-from tempfile import NamedTemporaryFile
 from typing import TypeVar
+
+from accelstudy.files.outputs import whole_file
 
 _DIGEST = hashlib.sha256().digest_size
 _OTHERS = stat.S_IWGRP | stat.S_IWOTH
@@ -58,23 +59,14 @@ def _read(file: Path) -> bytes:
 
 
 def _write(file: Path, content: bytes) -> None:
-    """Store it for the next process.
-
-    It appears whole or not at all: processes that start together each write their own file and
-    give it the name.
-    """
+    """Store it for the next process, whole or not at all, and readable by the user alone."""
     folder = file.parent
     folder.parent.mkdir(parents=True, exist_ok=True)
     folder.mkdir(mode=0o700, exist_ok=True)
     _check_own(folder, stat.S_ISDIR)
-    with NamedTemporaryFile(dir=folder, prefix=".", delete=False) as part:
-        try:
-            part.write(hashlib.sha256(content).digest() + content)
-            part.close()
-            os.replace(part.name, file)
-        except OSError:
-            os.unlink(part.name)
-            raise
+    with whole_file(file) as part:
+        part.touch(mode=0o600)
+        part.write_bytes(hashlib.sha256(content).digest() + content)
 
 
 def _check_own(path: Path, is_kind: Callable[[int], bool]) -> None:
