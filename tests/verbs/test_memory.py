@@ -87,7 +87,7 @@ def test_tables_files_and_the_command_are_leveled_alike(calibration, table, tmp_
 @pytest.mark.parametrize("unit", UNITS)
 def test_a_quantity_is_a_number_in_si_or_a_text_with_its_unit(unit):
     """Also where the unit begins with a digit, as 1/K does."""
-    given = InputQuantity(unit, "", -np.inf)
+    given = InputQuantity(unit, -np.inf)
     for number in (0.25, 2e-4, -3, np.float64(1e-9)):
         assert quantity("x", number, given) == number
     for name, size in UNITS[unit].items():
