@@ -197,9 +197,10 @@ def log_ticks(axis: Axis, low: float, high: float, *, few: bool = False) -> None
 def legend_columns(labels: Iterable[str], width: float = FULL) -> int:
     """Number of columns of a legend that fit the width of a figure, inches."""
     import matplotlib as mpl
+    from matplotlib.font_manager import FontProperties
     from matplotlib.textpath import TextPath
 
-    size = mpl.rcParams["legend.fontsize"]
+    size = FontProperties(size=mpl.rcParams["legend.fontsize"]).get_size_in_points()
     # Handle and spaces take about as much as seven letters m.
     extents = [TextPath((0, 0), label, size=size).get_extents().width for label in labels]
     columns = [extent + 7 * size for extent in extents]
