@@ -4,7 +4,8 @@ rule simulate:
         map(local, named_files(config)),
     output:
         **{name: f"{RESULTS}/tables/{SET_UP}/{name}.parquet" for name in TABLES},
-        estimates=f"{RESULTS}/estimates/{SET_UP}.parquet",
+        # A file system that loses what was written ends here, not in a later job.
+        estimates=ensure(f"{RESULTS}/estimates/{SET_UP}.parquet", non_empty=True),
     log:
         f"{RESULTS}/logs/simulate/{SET_UP}.log",
     conda:
