@@ -169,7 +169,8 @@ def model_title(model: str) -> str:
 
 def _part_title(part: str) -> str:
     """Name an effect as words, with the number of its setting."""
-    return re.sub(r"\((?:\w+=)?", " (", part.replace("_", " "))
+    plain = part.replace("_", " ").replace("crossaxis", "cross-axis")
+    return re.sub(r"\((?:\w+=)?", " (", plain)
 
 
 def new_figure(width: float, height_mm: float) -> Figure:
