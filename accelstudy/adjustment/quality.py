@@ -50,6 +50,8 @@ SINGLE_LEVEL = 0.001
 """Level of the test of a single position."""
 POWER = 0.8
 """Probability with which a detectable error or change is found."""
+MIDPOINTS = 200
+"""Number of nodes over an estimated variance, for the power of a test."""
 ATTITUDES = 64
 """Least number of attitudes over which the effect of an error on leveling is averaged."""
 NEAR_POLE = 0.1
@@ -447,12 +449,24 @@ def noncentrality(
     """λ0 at which a test of level `alpha` has `power`; 17.075 by default for one dof.
 
     The test is χ² where the noise is known; else F, whose noise has `noise_dof` degrees of freedom.
-    SciPy searches up to 10⁴, which is enough for tests of a level of 5 % and up to 20 parameters.
     """
     if np.isinf(noise_dof):
         return float(special.chndtrinc(special.chdtri(dof, alpha), dof, 1 - power))
-    limit = special.fdtri(dof, noise_dof, 1 - alpha)
-    return float(special.ncfdtrinc(dof, noise_dof, 1 - power, limit))
+    from scipy import optimize, stats  # slow to import, and seldom needed
+
+    # A mean over χ²(ν): the noncentral F of SciPy has no numbers for some ν, and its inverse ends
+    # at 10⁴.
+    evenly = (np.arange(MIDPOINTS) + 0.5) / MIDPOINTS
+    ratios = stats.chi2.ppf(evenly, noise_dof) / noise_dof
+    limits = dof * stats.f.isf(alpha, dof, noise_dof) * ratios
+
+    def missed(size: float) -> float:
+        return float(np.mean(stats.ncx2.cdf(limits, dof, size))) - (1 - power)
+
+    most = 1e4
+    while missed(most) > 0:
+        most *= 10
+    return float(optimize.brentq(missed, 1e-6, most))
 
 
 def reliability(solution: Solution) -> Reliability:

@@ -191,6 +191,9 @@ def test_noncentrality():
         critical = chi2.isf(0.001, dof)
         assert ncx2.sf(critical, dof, noncentrality(dof)) == pytest.approx(0.8, abs=1e-9)
     assert noncentrality(3) > noncentrality(1)
+    for dof, noise_dof in ((1, 1), (3, 7), (25, 1)):
+        critical, size = f.isf(0.001, dof, noise_dof), noncentrality(dof, noise_dof=noise_dof)
+        assert ncf.sf(critical, dof, noise_dof, size) == pytest.approx(0.8, abs=2e-3)
 
 
 def test_the_detectable_error_of_a_uniform_scheme():
