@@ -132,13 +132,6 @@ def test_exact_data_return_the_truth(name, approach):
     assert result.omega[0] < 1e-12
 
 
-def test_robot_angles_are_needed():
-    observed = replace(draw(0), angles=None)
-    assert calibrate(NINE, GRAVITY, observed).converged.all()
-    with pytest.raises(InputError, match="robot's roll and pitch"):
-        calibrate(NINE, ROBOT, observed)
-
-
 # --- Monte Carlo ---------------------------------------------------------------------------------
 
 REPLICATES = 2000

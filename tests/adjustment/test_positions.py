@@ -22,7 +22,6 @@ from accelstudy.adjustment.quality import (
     suspects,
 )
 from accelstudy.approaches import get_approach
-from accelstudy.basics.errors import InputError
 from accelstudy.campaign.calibration.fit import fit_campaign
 from accelstudy.campaign.calibration.result import Calibration
 from accelstudy.diagnosis.evidence.noise_models import (
@@ -34,7 +33,6 @@ from accelstudy.diagnosis.evidence.noise_models import (
     unequal_axes_density,
 )
 from accelstudy.diagnosis.evidence.size import Evidence, Level, log_mean
-from accelstudy.diagnosis.pipeline import diagnose
 from accelstudy.diagnosis.rules import RULES
 from accelstudy.diagnosis.space.frame import SessionFit
 from accelstudy.diagnosis.space.hypotheses import clusters, repeats_of
@@ -251,9 +249,3 @@ def test_times_of_a_jump_among_many_holds_are_some_with_all_others_between():
     between = [b.settings["t"] for b in coarse[20].between(coarse[21], hold)]
     assert 1 <= len(between) <= 7
     assert times[20] < min(between) <= max(between) < times[21]
-
-
-def test_a_diagnosis_of_too_many_positions_ends_in_one_line():
-    campaign = acs.simulate_campaign(seed=4, scheme="fibonacci-1001")
-    with pytest.raises(InputError, match="at most 1000 positions, and there are 1001"):
-        diagnose(campaign, NINE)

@@ -1,6 +1,5 @@
 """Plug-ins: a file or an installed package adds to the registries; what is wrong is one line."""
 
-import os
 import shutil
 import sys
 from pathlib import Path
@@ -58,11 +57,6 @@ def test_what_a_page_suggests_names_it_too():
     succeed("simulate-campaign", "--plugin", "ripple.py", "--out", "mine", *hidden)
     result = succeed("calibrate", "mine", "--model", "bias-scale+ripple", "--out", "new")
     assert " --plugin ripple.py\n" in result.stdout
-
-
-def test_one_that_is_no_file_is_one_line():
-    os.mkfifo("pipe.py")  # nobody writes to it, so to open it would last for ever
-    assert "pipe.py: is no file" in refusal("effects", "--plugin", "pipe.py")
 
 
 def test_the_help_loads_none():

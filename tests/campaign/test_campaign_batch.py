@@ -2,12 +2,11 @@
 
 import json
 import re
-import shutil
 
 import numpy as np
 import pandas as pd
 import pytest
-from calling import refused, succeed
+from calling import succeed
 from campaign_helpers import simulated_campaign
 from page_helpers import assert_sound, text_of
 
@@ -92,7 +91,7 @@ def test_the_overview(made):
     assert_sound(page)
 
 
-def test_a_batch_in_python(made, tmp_path):
+def test_a_batch_in_python(made):
     folder, _ = made
     batch = acs.batch([folder / "campaigns/plain", simulated_campaign(TRUTH, seed=9)])
     assert (batch.state, batch.failed) == ("accepted", {})
@@ -100,16 +99,6 @@ def test_a_batch_in_python(made, tmp_path):
     assert batch.to_frame()["sigma_source"].tolist() == ["a priori"] * 2
     assert len(batch.parameters) == 18
     batch.plot()
-    shutil.copytree(folder / "campaigns/plain", tmp_path / "plain")
-    with refused("are both named 'plain'"):
-        acs.batch([folder / "campaigns/plain", tmp_path / "plain"])
-
-
-def test_where_all_failed_there_is_one_line(tmp_path):
-    folders = [str(tmp_path / name) for name in ("first", "second")]
-    line = r"no campaign can be calibrated: first: .*no such folder.* \(and 1 more\)$"
-    with pytest.raises(acs.InputError, match=line):
-        acs.batch(folders)
 
 
 def test_what_a_page_shows_is_escaped(made, tmp_path):

@@ -9,12 +9,11 @@ import numpy as np
 import pandas as pd
 import pytest
 import yaml
-from calling import call, refusal, succeed
+from calling import call, succeed
 from click.testing import CliRunner
 from study_helpers import NINE, PROVENANCE, content, grid
 
 import accelstudy
-from accelstudy.basics.errors import InputError
 from accelstudy.commands.main import main
 from accelstudy.files.tables import write_table
 from accelstudy.schemes import get_scheme, scheme_families, scheme_names
@@ -125,8 +124,6 @@ def test_angles_in_degrees(monkeypatch):
         assert output("schemes", "mclaren-24") == gon  # the choice ends with its command
     assert " … 28.6 mdeg\n" in output("effects", "--angle-unit", "deg")
     assert " … 31.8 mgon\n" in output("effects")
-    line = refusal("--angle-unit", "deg", "effects")
-    assert line == "error: --angle-unit: give it after the command\n"
     monkeypatch.setenv("ACCELSTUDY_ANGLE_UNIT", "deg")
     assert "pole/deg" in output("schemes", "mclaren-24")
     assert output("schemes", "mclaren-24", "--angle-unit", "gon") == gon
@@ -174,8 +171,3 @@ def test_a_defect_is_not_taken_for_bad_input(monkeypatch):
 
     monkeypatch.setattr("accelstudy.verbs.tables.get_scheme", broken)
     assert isinstance(call("scheme", "faces-6").exception, ValueError)
-    monkeypatch.setattr(
-        "accelstudy.verbs.tables.get_scheme",
-        lambda name: (_ for _ in ()).throw(InputError("bad")),
-    )
-    assert call("scheme", "faces-6").stderr == "error: bad\n"

@@ -1,7 +1,6 @@
 """The command `design`, its file, and where a scheme of a file is used."""
 
 import pickle
-from inspect import signature
 
 import numpy as np
 import pytest
@@ -17,7 +16,6 @@ from accelstudy.design.estimability import estimability
 from accelstudy.design.order import _drift_shown, field_order
 from accelstudy.design.task import Task
 from accelstudy.leveling.error import cap_forces, tilt_error
-from accelstudy.planning.design import search_for
 from accelstudy.schemes import files, get_scheme
 from accelstudy.study.config import parse_study
 
@@ -70,9 +68,7 @@ def test_a_design_is_made_again_to_the_bit_and_replaces_nothing(tmp_path):
     assert path.read_bytes() == before
     succeed(*asked, copy)
     assert copy.read_bytes() == before
-    told = refusal("design", "--after", path, "--out", path, "--force")
-    assert "is the input" in told
-    assert "must end in .yaml" in refusal("design", "--out", tmp_path / "mine")
+    assert "is the input" in refusal("design", "--after", path, "--out", path, "--force")
 
 
 def test_commands_take_the_file_for_a_scheme(made, tmp_path):
@@ -131,28 +127,10 @@ def test_a_job_needs_no_file(tmp_path, monkeypatch):
     assert make_study().cells[0].directions is None  # of schemes that come along
 
 
-def asked(**given):
-    """Search by the keywords of a design."""
-    usual = {name: p.default for name, p in signature(find_positions).parameters.items()}
-    sizes = {"sigma": 0.002, "robot_sigma": 3.2 * MGON, "gravity_sigma": 0.0, "tilt_range": 0.8}
-    given = {**usual, **sizes, **given}
-    return search_for(**{k: v for k, v in given.items() if k not in ("positions", "starts")})
-
-
-@pytest.mark.parametrize(("given", "wrong"), [
-    ({"criterion": "E"}, "unknown criterion 'E'"),
-    ({"attitudes": "cub"}, "did you mean 'cube'"),
-    ({"roll": (0.1, -0.1)}, "roll: the first angle must be less"),
-    ({"sigma": -1.0}, "sigma: must be"),
-])  # fmt: skip
-def test_contradictory_wishes_are_said_in_one_line(given, wrong):
-    with pytest.raises(InputError, match=wrong):
-        asked(**given)
-
-
-def test_what_was_measured_before():
-    after = asked(approach="gravity", after="faces-6")
-    assert after.task.missing(after.optimum(6, 1)) == ""
+def test_what_was_measured_before_counts():
+    """Six faces leave the angles between the axes open, and six more positions determine them."""
+    asked = {"positions": 6, "approach": "gravity", "starts": 1}
+    assert find_positions(after="faces-6", **asked).state == "found"
 
 
 def test_the_order_is_a_round_trip_of_small_turns():

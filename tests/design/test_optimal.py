@@ -9,7 +9,6 @@ from usual import GRAVITY, NINE
 
 from accelstudy.adjustment.calibration import CalibrationProblem
 from accelstudy.approaches import get_approach
-from accelstudy.basics.errors import InputError
 from accelstudy.basics.units import GON
 from accelstudy.design.continuous import continuous_optimum
 from accelstudy.design.criteria import get_criterion, rms_tilt
@@ -191,14 +190,6 @@ def test_stored_designs_have_their_efficiency_and_bound(family):
         assert search.value(search.optimum(n, starts=1)) > known - SEARCHED
 
 
-def test_other_numbers_of_optimal_positions_are_refused_with_what_there_is():
-    with pytest.raises(InputError, match="d-optimal-8 is not stored; D-optimal are 10 to 40 pos"):
-        get_scheme("d-optimal-8")
-    stored = "9 to 40, 45, 50, 60, 70, 80, 100, 120 positions"
-    with pytest.raises(InputError, match=f"{stored}.*accelstudy design --positions 41"):
-        get_scheme("i-optimal-41")
-
-
 # Constraints
 
 
@@ -240,26 +231,6 @@ def test_attitudes_of_a_cube_of_a_hand_and_of_a_scheme(tmp_path):
     expected = [[0, 0], [0, np.pi / 4], [np.pi / 2, 0]]
     np.testing.assert_allclose(np.abs(sorted(angles_to(listed.points).tolist())), expected)
     assert len(find_attitudes("xsens-38", ("all",)).points) <= 38
-    task, criterion = asked(BY_ROBOT, "I")
-    with pytest.raises(InputError, match=r"the allowed attitudes do not suffice: rank"):
-        Search(task, criterion, Attitudes("two", listed.points[:2])).optimum(9)
-    with pytest.raises(InputError, match="unknown set of attitudes 'al'; did you mean 'all'"):
-        find_attitudes("al", ("all",))
-
-
-def test_what_cannot_be_is_said_in_one_line():
-    task, criterion = asked(BY_GRAVITY, "D")
-    with pytest.raises(InputError, match=r"no 8 positions of all attitudes were .*: rank 8 of 9"):
-        Search(task, criterion).optimum(8)
-    nowhere = Attitudes(pitch=(90 * GON, 100 * GON), pole_distance=30 * GON)
-    with pytest.raises(
-        InputError, match="no attitude is left of all attitudes with pitch from 90 gon"
-    ):
-        Search(task, criterion, nowhere).optimum(9)
-    with pytest.raises(InputError, match=r"depends on the order of the positions \(step_x\)"):
-        Task(get_model("bias-scale+hysteresis"), GRAVITY)
-    with pytest.raises(InputError, match="needs the time of each position"):
-        Task(get_model("bias-scale+bias_drift"), GRAVITY)
 
 
 # Telling two explanations apart

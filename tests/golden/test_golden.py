@@ -41,7 +41,7 @@ def test_no_command_of_a_page_fails_and_no_picture_is_old():
 
 def test_what_is_refused_is_one_line_and_nothing_is_written():
     text = "".join(kept_of("refusals").values())
-    answers = re.split(r"^(?:=== |accelstudy (?!.*…)).*\n", text, flags=re.M)[1:]
+    answers = re.split(r"^(?:=== |acs\.|accelstudy (?!.*…)).*\n", text, flags=re.M)[1:]
     assert len(answers) > 300
     line = r"! error: .*\n+((accelstudy|parse) .*\n)?"  # and the command of the next ones
     assert [said for said in answers if not re.fullmatch(line, said)] == []

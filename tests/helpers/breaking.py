@@ -95,7 +95,7 @@ def places(one: Fault) -> list[str]:
         f"{path.relative_to(ROOT)}::{name}"
         for name in one.tests
         for path, text in files.items()
-        if f"\ndef {name}(" in text
+        if f"\ndef {name.partition('[')[0]}(" in text
     ]
     return found or [f"tests/{one.room}"]
 

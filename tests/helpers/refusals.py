@@ -2,7 +2,8 @@
 
 A command has a line that begins with `accelstudy`, or `parse` and the name of a function that takes
 the content of a YAML file and its name. Each indented line below it is one way to go wrong: words
-that take the place of `…` in the command, or a change of a file. Changes are
+that take the place of `…` in the command, or a change of a file. A line that begins with `acs.` is
+a call of a function. Changes are
 
     FILE = TEXT         other content, with the escapes of Python; of bytes, too
     FILE += {KEY: …}    other keys of YAML or JSON; null removes one
@@ -25,6 +26,7 @@ from tempfile import TemporaryDirectory
 from types import SimpleNamespace
 from unittest import mock
 
+import pandas as pd
 import stand_ins
 import yaml
 from calling import call, succeed
@@ -32,6 +34,7 @@ from log_helpers import by_hand, table
 from places import ROOT
 from study_helpers import content as study_content
 
+import accelstudy as acs
 from accelstudy.basics.errors import InputError
 from accelstudy.files.reading import overlay, read_layer
 
@@ -82,8 +85,11 @@ def answer(sound, command, wrong=""):
         words = [part for part in wrong.split(" && ") if not changed(here, part)]
         before = content(here)
         with chdir(here):
-            program, *words = shlex.split(command.replace("…", " ".join(words)))
-            result = (call if program == "accelstudy" else parsed)(*words)
+            if command.startswith("acs."):
+                result = outcome(eval, command, {"acs": acs, "pd": pd})
+            else:
+                program, *words = shlex.split(command.replace("…", " ".join(words)))
+                result = call(*words) if program == "accelstudy" else outcome(parse, *words)
         said = [f"! {line}\n" for line in result.stderr.splitlines()]
         said += [f"> {line}\n" for line in result.stdout.splitlines()]
         if result.exit_code != 2:
@@ -93,10 +99,15 @@ def answer(sound, command, wrong=""):
         return SHORT.sub(r"\1, …", "".join(said))
 
 
-def parsed(function, file):
-    """What a function says of a file, as the result of a command."""
+def parse(function, file):
+    """Let a function read a file."""
+    resolve_name(function)(read_layer(file), file)
+
+
+def outcome(function, *given):
+    """What a function says of its input, as the result of a command."""
     try:
-        resolve_name(function)(read_layer(file), file)
+        function(*given)
     except InputError as error:
         return SimpleNamespace(stderr=f"error: {error}\n", stdout="", exit_code=2)
     return SimpleNamespace(stderr="", stdout="", exit_code=0, exception=None)

@@ -8,7 +8,6 @@ from scipy.stats import norm
 from study_helpers import grid, make_study, run_study
 from usual import NINE, PAPER
 
-from accelstudy.basics.errors import InputError
 from accelstudy.basics.units import GON, MGON
 from accelstudy.leveling.sensitivity import FORCES, leveling_sensitivity, total_effects
 from accelstudy.study.sensitivity import sensitivity_table
@@ -118,13 +117,3 @@ def test_the_study_takes_the_sds_from_the_simulation(tmp_path):
     assert tables["gravity"]["alpha_zx"] == pytest.approx(0.357, abs=0.03)
     # The robot determines α_zx more than twice as well.
     assert tables["robot"]["alpha_zx"] < 0.5 * tables["gravity"]["alpha_zx"]
-
-
-def test_a_cell_without_estimates_is_an_input_error(tmp_path):
-    sensitivity = {"base_samples": 16, "roll_gon": [0], "pitch_gon": [0]}
-    summary = run_study(tmp_path, grids=[grid(schemes="rings-24", replicates=5)])["summary"]
-    study = make_study(sensitivity=sensitivity)
-    with pytest.raises(
-        InputError, match=f"no estimates of the cell {NINE.name}/mclaren-24/gravity"
-    ):
-        sensitivity_table(study, summary)

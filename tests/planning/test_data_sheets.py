@@ -7,7 +7,6 @@ import numpy as np
 import pytest
 from calling import refusal, succeed
 
-from accelstudy.basics.errors import InputError
 from accelstudy.basics.units import STANDARD_GRAVITY
 from accelstudy.data_sheets import (
     QUANTITIES,
@@ -103,12 +102,10 @@ def test_a_nonlinearity_is_taken_as_a_parabola_or_a_cubic_of_the_same_deviation(
         assert left == pytest.approx(0.01)
 
 
-def test_a_users_file_is_read_and_an_unknown_sensor_names_those_there_are(tmp_path):
+def test_a_users_file_is_read(tmp_path):
     path = tmp_path / "my-sensor.yaml"
     path.write_text("noise_density: 100 ug/sqrt(Hz)\nbias_instability: 20 ug\n")
     assert get_data_sheet(str(path)).name == "my-sensor"
-    with pytest.raises(InputError, match=r"unknown sensor 'adxl35'; did you mean 'adxl355'"):
-        get_data_sheet("adxl35")
 
 
 def test_a_sensor_of_which_only_the_noise_is_known_keeps_it_however_long_the_hold():
@@ -155,24 +152,11 @@ def test_a_campaign_tells_the_noise_of_its_positions(still_log, tmp_path):
     )
 
 
-@pytest.mark.parametrize(("rows", "message"), [(40, "no static hold"), (2, "")])
-def test_a_log_that_is_too_short_ends_with_one_line(rows, message, tmp_path):
-    path = tmp_path / "short.csv"
-    np.savetxt(path, np.random.default_rng(1).standard_normal((rows, 3)), delimiter=",")
-    assert message in refusal("data-sheet", path, *READ, "--out", tmp_path / "mine.yaml")
-    assert not (tmp_path / "mine.yaml").exists()
-
-
-def test_a_log_is_no_sensor_and_says_how_to_make_one(still_log):
-    with pytest.raises(InputError, match=r"accelstudy data-sheet .*still\.csv --out still\.yaml"):
-        get_data_sheet(str(still_log))
-
-
-def history(path, scatter, rate, name="b_%s"):
+def history(path, scatter, rate):
     """What a history.json says of three axes, SI and per year."""
     each = zip("xyz", scatter, rate, strict=True)
     parameters = [
-        {"name": name % axis, "scatter": {"sd": sd}, "rate": {"per_year": of_year, "sigma": 0.0}}
+        {"name": f"b_{axis}", "scatter": {"sd": sd}, "rate": {"per_year": of_year, "sigma": 0.0}}
         for axis, sd, of_year in each
     ]
     path.write_text(json.dumps({"schema_version": 1, "parameters": parameters}), encoding="utf-8")
@@ -189,9 +173,3 @@ def test_a_history_tells_drift_and_switch_on_scatter(tmp_path):
     said = sheet.bias_change(years * 365.25 * 86400, restarted=True)
     assert said == pytest.approx(change, rel=0.01)
     assert "repeatability" in sheet.known_quantities
-
-
-def test_a_history_without_a_bias_is_refused(tmp_path):
-    path = history(tmp_path / "history.json", [0.0] * 3, [0.0] * 3, name="s_%s")
-    given = ("--tilt-accuracy", "10mgon", "--sigma", "2mm/s2", "--history", path)
-    assert refusal("plan", *given).startswith(f"error: {path}: parameters: no bias")

@@ -10,7 +10,7 @@ import numpy as np
 import pandas as pd
 import pytest
 import yaml
-from calling import call, refusal, succeed
+from calling import call, succeed
 from leveling_helpers import leveling_error
 from page_helpers import assert_told_alike
 from places import ROOT
@@ -433,9 +433,6 @@ def test_the_command_writes_what_it_says(tmp_path):
     again = succeed(*asked, out, "--quiet")
     assert len(again.stdout.splitlines()) < 10
     assert again.stderr == ""
-    (tmp_path / "full").mkdir()
-    (tmp_path / "full" / "mine.txt").write_text("mine")
-    assert "--force" in refusal(*asked, tmp_path / "full")
 
 
 def test_an_unreachable_target_has_an_exit_status_of_its_own():

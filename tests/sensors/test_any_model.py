@@ -8,7 +8,7 @@ import gross
 import numpy as np
 import pandas as pd
 import pytest
-from calling import call, refusal, succeed
+from calling import call, succeed
 
 import accelstudy as acs
 from accelstudy.approaches import get_approach
@@ -128,15 +128,6 @@ def test_a_calibration_with_the_noise_that_was_found():
 
 
 # --- forms for devices ---------------------------------------------------------------------------
-
-
-def test_forms_hold_what_they_can(diagnosed):
-    path = diagnosed / "calibration.json"
-    arguments = "accel_real temperature, accel_real time, accel_real force[3])"
-    assert arguments in run("export", path)
-    line = refusal("export", path, "--form", "matrix")
-    assert "no matrix can hold thermal_bias and warm_up" in line
-    assert line.count("\n") == 1
 
 
 @pytest.mark.parametrize("frame", ["frd", "flu", "rfu"])

@@ -11,7 +11,6 @@ from usual import GRAVITY, ROBOT, G
 
 from accelstudy.adjustment import calibrate
 from accelstudy.adjustment.linear_theory import LinearTheory
-from accelstudy.basics.errors import InputError
 from accelstudy.design.estimability import estimability
 from accelstudy.effects import HoldConditions, TemperatureCourse, effect_names, get_effect
 from accelstudy.effects.hold_conditions import MIN_STEP
@@ -301,12 +300,6 @@ def test_candidates_fit_the_session():
     assert get_effect("bias_jump").candidates(few, FORCES[:3], G) == ()
 
 
-@pytest.mark.parametrize("name", ["warm_up", "bias_jump"])
-def test_candidates_need_the_time(name):
-    with pytest.raises(InputError, match="needs the column 'time' of each position; it is absent"):
-        get_effect(name).candidates(HoldConditions(), FORCES, G)
-
-
 # --- estimation ----------------------------------------------------------------------------------
 
 
@@ -367,11 +360,6 @@ def test_what_equals_what(effects, approach, columns, rank):
 
 
 # --- columns of the holds ------------------------------------------------------------------------
-
-
-def test_a_column_that_is_absent_is_named():
-    with pytest.raises(InputError, match="needs the column 'temperature' of each position"):
-        session(model_of("thermal_bias"), np.ones(12), SCHEME.directions)
 
 
 def test_an_effect_with_some_of_its_parameters():

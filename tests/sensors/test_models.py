@@ -4,7 +4,6 @@ import pytest
 import yaml
 
 import accelstudy as acs
-from accelstudy.basics.errors import InputError
 from accelstudy.effects import Effect, effect_names, get_effect
 from accelstudy.effects.base import expressions
 from accelstudy.sensors.models import MODELS, get_model
@@ -72,5 +71,3 @@ def test_a_campaign_of_a_composition_has_each_effect_once():
     truth = acs.simulate_campaign(model=f"{NINE}+warm_up(tau=300)", effects=effects).truth
     assert [e["name"] for e in truth["sensor"]] == ["bias", "scale", "nonorthogonality"]
     assert [e["name"] for e in truth["effects"]] == ["warm_up"]
-    with pytest.raises(InputError, match="occur in two effects"):
-        acs.simulate_campaign(effects=("warm_up", "warm_up(tau=3)"))

@@ -4,10 +4,9 @@ import math
 
 import numpy as np
 import pytest
-from calling import refused
 from leveling_helpers import leveling_error
 from scipy import stats
-from study_helpers import NINE, grid, make_cells, make_study, simulated
+from study_helpers import NINE, grid, make_cells, simulated
 
 from accelstudy.basics.units import MGON, STANDARD_GRAVITY
 from accelstudy.effects import get_effect
@@ -106,23 +105,3 @@ def test_cells_know_their_holds():
 def test_any_effect_can_be_switched_on(name):
     cells = make_cells(grid(), simulated_effects=["bias", name], holds=HOLDS)
     assert np.isfinite(simulated(cells[f"{NINE}/mclaren-24/robot"]).estimates).all()
-
-
-@pytest.mark.parametrize(("keys", "expected"), [
-    ({"simulated_effects": ["thermal_bias"]},
-     "holds.temperature_degC: missing; the effect 'thermal_bias' needs the temperature of"),
-    ({"simulated_effects": ["warm_up"], "holds": {**HOLDS, "interval_s": None}},
-     "holds.interval_s: missing; the effect 'warm_up' needs the time"),
-    ({"holds": {"temperature_degC": [-300, 20]}},
-     "holds.temperature_degC.0: must be from -273.15 to 10000 °C, not -300"),
-    ({"holds": {"vibration": [0, 1]}}, "did you mean 'vibration_mps2'?"),
-    ({"sensor": {"warm_up(t=3)": {"value": 1, "unit": "mg"}}}, "unknown setting of the effect"),
-    ({"sensor": {"thermal_bias": {"value": [1, 1, 1], "unit": "mg"}}},
-     "unknown unit of a quantity in m/s^2/K 'mg'"),
-    ({"models": {"mine": ["bias", "thermal_bias"]}, "grids": [grid("mine")], "holds": HOLDS,
-      "sensitivity": {"roll_gon": [0], "pitch_gon": [0], "model": "mine"}},
-     "sensitivity.model: 'mine' depends on the temperature"),
-])  # fmt: skip
-def test_what_is_wrong_with_a_configuration(keys, expected):
-    with refused(expected):
-        make_study(**keys)

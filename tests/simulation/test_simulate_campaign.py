@@ -1,9 +1,8 @@
 """Simulated campaigns: the truth is told, estimated again, and drawn from separate streams."""
 
 import numpy as np
-import pytest
 import yaml
-from calling import refusal, succeed
+from calling import succeed
 from scipy import stats
 
 from accelstudy import simulate_campaign as simulate
@@ -99,25 +98,3 @@ def test_the_command_writes_a_campaign_and_apart_from_it_the_truth(tmp_path):
     assert yaml.safe_load(truth_path.read_text()) == expected.truth
     text = (folder / "campaign.yaml").read_text()
     assert not any(word in text for word in ("warm_up", "heavy", "seed", "truth"))
-
-
-@pytest.mark.parametrize(("arguments", "expected"), [
-    (["--effect", "thermal_bias"], "temperature: missing; the effect 'thermal_bias' needs"),
-    (["--effect", "warm_up", "--interval", "none"], "interval: missing; the effect 'warm_up'"),
-    (["--effect", "thermal_bia"], "did you mean 'thermal_bias'?"),
-    (["--effect", "bias: 1, 2"], "expected 3 numbers after the colon (b_x in m/s^2, b_y in"),
-    (["--effect", "warm_up(tau=1)", "--effect", "warm_up"], "occur in two effects"),
-    (["--gross-error", "row_order"], "--gross-error: no longer an option; change the rows of"),
-    (["--sigma", "0"], "--sigma: '0': must be at least 1e-09 and at most 1000 m/s^2"),
-    (["--vibration", "-1:1"], "vibration: must be from 0 to 10000"),
-    (["--repeat-first", "25"], "repeat_first: must be at most 24"),
-    (["--temperature", "20"], "temperature: expected two numbers, as 20:40, not '20'"),
-    (["--temperature-order", "abba"], "unknown temperature_order 'abba'"),
-    (["--n-samples", "1"], "--n-samples: must be from 2 to 1000000000, not 1"),
-    (["--sigma-angle", "3mgon"], "--sigma-angle: no longer an option; --robot-sigma takes it"),
-    (["--scheme", "mclaren-25"], "unknown scheme"),
-    (["--truth", "/dev/null/truth.yaml"], "/dev/null is not a folder"),
-])  # fmt: skip
-def test_bad_input_ends_with_one_line_and_leaves_nothing(arguments, expected, tmp_path):
-    assert expected in refusal("simulate-campaign", "--out", tmp_path / "one", *arguments)
-    assert not (tmp_path / "one").exists()

@@ -13,7 +13,7 @@ from study_helpers import NINE, content, grid, make_study
 
 from accelstudy.approaches import approach_names, get_approach
 from accelstudy.basics.errors import InputError
-from accelstudy.basics.units import GON, MGON
+from accelstudy.basics.units import MGON
 from accelstudy.files.reading import config_hash, overlay, read_layer
 from accelstudy.noise_effects import get_noise_effect
 from accelstudy.schemes import get_scheme, scheme_names
@@ -153,28 +153,9 @@ def test_numbers_as_yaml_1_1_reads_them():
     assert make_study(noise={"sensor": {"sigma_mps2": "2e-3"}}).noise.sensor.sigma_mps2 == 2e-3
 
 
-@pytest.mark.parametrize(("effect", "values", "unit", "expected"), [
-    ("bias", [1, 2, 3], "mm/s^2", [1e-3, 2e-3, 3e-3]),
-    ("scale", [1, 2, 3], "%", [0.01, 0.02, 0.03]),
-    ("nonorthogonality", [1, 2, 3], "gon", [GON, 2 * GON, 3 * GON]),
-])  # fmt: skip
-def test_truth_in_si(effect, values, unit, expected):
-    study = make_study(sensor={effect: {"value": values, "unit": unit}})
-    assert [*study.truth([effect]).values()] == pytest.approx(expected, rel=1e-14)
-    assert set(study.truth(["cubic_scale"]).values()) == {0.0}
-
-
 def test_the_hash_of_a_configuration_is_that_of_what_numbers_depend_on():
     assert config_hash(content(angle_unit="deg")) == config_hash(content())
     assert config_hash(content(seed=2)) != config_hash(content())
-
-
-def test_paper_with_all_it_needs():
-    study = make_study(paper=True, sensitivity=SENSITIVITY)
-    assert study.paper
-    # The gravity-based cell is the same whatever the robot's accuracy, the robot's is not.
-    with pytest.raises(InputError, match=f"{NINE}/mclaren-24/robot"):
-        make_study(sensitivity=SENSITIVITY, grids=[grid(robot_sigma_mgon=[1])])
 
 
 # --- anything at all -----------------------------------------------------------------------------

@@ -8,7 +8,6 @@ import pytest
 from docutils.core import publish_string
 from study_helpers import NINE, content, grid, run_study
 
-from accelstudy.basics.errors import InputError
 from accelstudy.drawing import style
 from accelstudy.effects import effect_names
 from accelstudy.sensors.models import MODELS
@@ -212,8 +211,3 @@ def test_effects_of_the_models_causes_and_approaches_have_colours_of_their_own()
 ])  # fmt: skip
 def test_titles_of_models_are_short(model, title):
     assert style.model_title(model) == title
-
-
-def test_an_unknown_figure_is_an_input_error_that_names_a_near_one():
-    with pytest.raises(InputError, match="figure-2"):
-        get_figure("figure-22")

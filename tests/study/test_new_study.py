@@ -61,13 +61,3 @@ def test_a_new_study_is_planned_by_its_workflow_with_all_profiles(tmp_path):
     assert planned.returncode == 0, planned.stdout
     assert "All results of the study mine" in planned.stdout
     assert "snakemake --cores 2 " in (tmp_path / "mine" / "README.md").read_text("utf-8")
-
-
-@pytest.mark.parametrize(("words", "reason"), [
-    (("--template", "campaigns"), "--template: no longer an option; it sets up a study; `accel"),
-    (("--sensor", "adxl355"), "--sensor: no longer an option; set `noise` and `sensor` in config"),
-])  # fmt: skip
-def test_what_there_is_not_is_one_line(words, reason, tmp_path, monkeypatch):
-    monkeypatch.chdir(tmp_path)
-    assert reason in refusal("init", "new", *words)
-    assert not (tmp_path / "new").exists()

@@ -19,7 +19,6 @@ from accelstudy.basics.units import STANDARD_GRAVITY
 from accelstudy.campaign.header import LogLayout
 from accelstudy.campaign.importing.settings import ImportSettings
 from accelstudy.commands.main import main
-from accelstudy.files.validation import validate
 from accelstudy.verbs import kinds
 
 TERMINAL = {"out", "force", "quiet", "angle_unit", "plugin", "figure", "truth"}
@@ -115,41 +114,17 @@ def test_what_is_printed_is_what_the_function_returns(tmp_path: Any) -> None:
         assert [line.split()[0] for line in lines[1:]] == table.iloc[:, 0].tolist()
         assert table.attrs["legend"] in said(*words)
     pd.testing.assert_frame_equal(accelstudy.list_effects(), accelstudy.catalogue("effects"))
-    with pytest.raises(accelstudy.InputError, match="`campaign` and `scheme` exclude each other"):
-        accelstudy.list_effects(campaign=campaign, scheme="mclaren-24")
     assert accelstudy.init(tmp_path / "mine") in said("init", tmp_path / "mine", "--force")
 
 
-@pytest.mark.parametrize(("verb", "old"), [
-    ("simulate-campaign", "sigma_angle"), ("plan", "robot_accuracy"),
-    ("simulate", "robot_accuracy"),
-])  # fmt: skip
-def test_the_noise_of_the_robot_has_one_name(verb: str, old: str) -> None:
-    assert "robot_sigma" in inspect.signature(function(verb)).parameters
-    with pytest.raises(accelstudy.InputError, match=f"^{old}: no longer a keyword; `robot_sigma` "):
-        function(verb)(**{old: "3mgon"})
-    if verb in VERBS:
-        option = f"--{old.replace('_', '-')}"
-        line = refusal(verb, option, "3mgon", "--out", "none")
-        assert line == f"error: {option}: no longer an option; --robot-sigma takes it\n"
-
-
 def test_keywords_of_an_import_are_the_keys_of_its_settings() -> None:
-    """But those of a reference; an old key ends in a line that says what to write."""
+    """But those of a reference."""
     keywords = {*kinds.keywords(accelstudy.find_holds)} - {"settings"}
     assert {name for name in keywords if not name.startswith("reference")} == {
         *ImportSettings.model_fields
     } - {"sensor", "gravity_sigma"}
     for text, si in (("8g", 8 * STANDARD_GRAVITY), (30, 30.0)):
         assert ImportSettings.model_validate({"range": text}).range == si
-    for old, value, said in (
-        ("rate_hz", 50, "rate_hz: no longer a key; write rate instead"),
-        ("window_s", 2, "window_s: no longer a key; write window instead"),
-        ("robot", {"angle_sigma_mgon": 3}, "robot: no longer a key; write robot_sigma, as 3.2mgon"),
-        ("gravity", {"value_mps2": 9.81}, "gravity: must be a number, not "),
-    ):
-        with pytest.raises(accelstudy.InputError, match=f"^mine.yaml: {said}"):
-            validate(ImportSettings, {old: value}, "mine.yaml")
     # What accelstudy wrote itself still reads.
     assert LogLayout.model_validate({"rate_hz": 50}).rate == 50
 
