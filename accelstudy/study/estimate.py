@@ -121,10 +121,11 @@ def ratio(above: Value, below: Value) -> Value:
 def correlation(x: Array) -> Value:
     """Correlations below the diagonal, in the order of `numpy.tril_indices`."""
     i, j = np.tril_indices(len(x), -1)
-    covariance = np.atleast_2d(np.cov(x, ddof=0))
+    apart = x - x.mean(axis=1, keepdims=True)
+    covariance = apart @ apart.T / x.shape[1]
     scale = np.sqrt(np.diagonal(covariance))
     value = covariance[i, j] / (scale[i] * scale[j])
-    first = (x[:, :MAX_INFLUENCES] - x.mean(axis=1, keepdims=True)) / scale[:, None]
+    first = apart[:, :MAX_INFLUENCES] / scale[:, None]
     squares = first[i] ** 2 + first[j] ** 2
     return value, first[i] * first[j] - value[:, None] / 2 * squares
 
