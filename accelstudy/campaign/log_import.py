@@ -58,7 +58,7 @@ class LogImport:
         return cls(*import_log(public_file(name, Path(folder)), settings))
 
     def write(self, folder: Path, place: Path) -> None:
-        """Write the folder of the campaign and, of a log, segmentation.svg and .png."""
+        """Write the folder of the campaign and, of a log, segmentation.png."""
         write_campaign(self.campaign, folder)
         if self.figure and (holds := self.holds) is not None:
             # Matplotlib takes longer to import than a log of usual length to read.
@@ -68,7 +68,7 @@ class LogImport:
             first = self.campaign.holds[["fx", "fy", "fz"]].to_numpy()[0]
             offset = holds.means[0] - first
             draw = {"segmentation": lambda: segmentation_figure.draw_segmentation(holds, offset)}
-            save_all(draw, folder)
+            save_all(draw, folder, ["png"])
 
     def tell(self, place: Path) -> None:
         """Print what was imported, with its warnings, and where to."""

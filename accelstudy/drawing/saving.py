@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import html
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Collection, Mapping
 from pathlib import Path
 
 import numpy as np
@@ -52,7 +52,11 @@ def save(figure: Figure, path: str | Path, title: str, dpi: int) -> None:
     figure.set_layout_engine("none")  # laid out once, alike in all files
 
 
-def save_all(figures: Mapping[str, Callable[[], Figure]], folder: Path) -> dict[str, str]:
+def save_all(
+    figures: Mapping[str, Callable[[], Figure]],
+    folder: Path,
+    kinds: Collection[str] = ("svg", "png"),
+) -> dict[str, str]:
     """Draw the figures of a page and write them under their names; returns elements for the page.
 
     If a figure fails, the others are drawn all the same. A line on the page and a warning on stderr
@@ -62,20 +66,21 @@ def save_all(figures: Mapping[str, Callable[[], Figure]], folder: Path) -> dict[
     ----------
     figures : mapping of name to a function that draws the figure
     folder : Path
+    kinds : endings of the files; without svg there are no elements
     """
-    return {name: _element(draw, folder, name) for name, draw in figures.items()}
+    return {name: _element(draw, folder, name, kinds) for name, draw in figures.items()}
 
 
-def _element(draw: Callable[[], Figure], folder: Path, name: str) -> str:
+def _element(draw: Callable[[], Figure], folder: Path, name: str, kinds: Collection[str]) -> str:
     """Return the element of one figure, or what is said in its place."""
     try:
         with in_style():
             figure = draw()
         _simplify(figure)
-        for kind in ("svg", "png"):
+        for kind in kinds:
             save(figure, folder / f"{name}.{kind}", name, PAGE_DPI)
-        text = (folder / f"{name}.svg").read_text("utf-8")
-        return text[text.index("<svg") :]
+        text = (folder / f"{name}.svg").read_text("utf-8") if "svg" in kinds else ""
+        return text[text.find("<svg") :]
     except OSError:  # such as a full disk, which is no failure of the figure
         raise
     except Exception as error:

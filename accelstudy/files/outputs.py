@@ -87,6 +87,7 @@ DIAGNOSIS = OutputKind(
 CALIBRATION = OutputKind(
     "calibration", "calibration.json", ("positions.parquet", "report.html"), ("figures",)
 )
+# segmentation.svg is of folders of 0.3.
 CAMPAIGN = OutputKind(
     "campaign",
     "campaign.yaml",
