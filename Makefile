@@ -27,7 +27,7 @@ export OPENBLAS_NUM_THREADS := 1
 export OMP_NUM_THREADS := 1
 export MKL_NUM_THREADS := 1
 
-.PHONY: help env test golden golden-renew coverage test-processors test-processors-part test-cluster test-breaks smoke reproduce anew unlock report positions hidden-effects hidden-docs real-noise optimal-schemes pictures benchmarks docs wheel lint lock clean
+.PHONY: help env test golden golden-renew coverage test-processors test-processors-part test-breaks smoke reproduce anew unlock report positions hidden-effects hidden-docs real-noise optimal-schemes pictures benchmarks docs wheel lint lock clean
 
 help: ## list the targets
 	@awk -F ':.*## ' '/^[a-z-]+:.*## / { printf "%-18s%s\n", $$1, $$2 }' Makefile
@@ -61,9 +61,6 @@ test-processors-part: $(READY) ## run a few tests with the instructions of an ol
 	  repository/test_examples.py design/test_schemes.py repository/test_pole.py \
 	  simulation/test_simulation.py)
 
-test-cluster: $(READY) ## run the small configuration as on a cluster with SLURM, and compare
-	python tests/helpers/cluster.py
-
 test-breaks: $(READY) ## break a copy of the package on purpose, and see that tests notice
 	python tests/helpers/breaking.py
 
@@ -96,7 +93,6 @@ hidden-docs: $(READY) ## study hidden effects, and take score and figures into d
 	cp results/hidden-effects/score.md docs/guides/hidden-effects-score.md
 	for name in naming methods sets calibration outside; do \
 	  cp results/hidden-effects/figures/$$name.png docs/figures/hidden-$$name.png; done
-	python tests/helpers/hidden_sample.py
 
 # Of the logs in FOLDER, or downloaded to it: make real-noise FOLDER=~/logs
 real-noise: $(READY) ## put known effects into public logs, find them again, and take the score into docs

@@ -36,7 +36,6 @@ from accelstudy.diagnosis.evidence.size import Evidence, Level, log_mean
 from accelstudy.diagnosis.rules import RULES
 from accelstudy.diagnosis.space.frame import SessionFit
 from accelstudy.diagnosis.space.hypotheses import clusters, repeats_of
-from accelstudy.effects import HoldConditions, get_effect
 from accelstudy.simulation.sessions import Noise
 
 FEW, MANY = 400, 1600
@@ -236,16 +235,3 @@ def test_unequal_axes_have_the_likelihood_of_whole_covariance_matrices(frame):
         prior.append(np.exp(-(np.hypot(*contrasts) ** 2) / (2 * RULES.spread_axes**2)))
     found = unequal_axes_density(residuals, evidence, None)
     assert found == pytest.approx(float(log_mean(np.array(logs), prior)), abs=1e-8)
-
-
-def test_times_of_a_jump_among_many_holds_are_some_with_all_others_between():
-    """Not all are searched at first; those next to the best one are looked at then."""
-    hold = HoldConditions(time=60.0 * np.arange(1000))
-    coarse = get_effect("bias_jump").candidates(hold, np.zeros((1000, 3)), 9.8)
-    assert len(coarse) <= 50
-    times = np.array([c.settings["t"] for c in coarse])
-    assert (times[0], times[-1]) == (90, 60 * 997.5)
-    assert np.all(np.diff(times) > 0)
-    between = [b.settings["t"] for b in coarse[20].between(coarse[21], hold)]
-    assert 1 <= len(between) <= 7
-    assert times[20] < min(between) <= max(between) < times[21]

@@ -234,31 +234,8 @@ def commands(folder, out):
         "calibrate": ("calibrate", campaign, "--out", out),
         "apply": ("apply", calibration, folder / "log.csv", "--out", out),
         "import": ("import", folder / "means.csv", "--means", "--out", out),
-        "simulate-campaign": ("simulate-campaign", "--scheme", "fibonacci-12", "--out", out),
         "truth": ("simulate-campaign", "--out", f"{out}-campaign", "--truth", out),
     }
-
-
-@pytest.mark.parametrize("name", commands(Path(), Path()))
-def test_commands_overwrite_nothing(measured, tmp_path, name):
-    out = tmp_path / "out"
-    if name in ("apply", "truth"):
-        write(tmp_path, out="mine")
-    else:
-        write(out, mine="mine", **({"campaign_yaml": "mine"} if name == "import" else {}))
-    before = content(tmp_path)
-    assert "--force" in refusal(*commands(measured, out)[name])
-    assert content(tmp_path) == before
-    succeed(*commands(measured, out)[name], "--force")
-    assert out.read_text() != "mine" if out.is_file() else (out / "mine").read_text() == "mine"
-
-
-@pytest.mark.parametrize("name", ["calibrate", "import"])
-def test_commands_write_nothing_into_input(measured, name):
-    before = content(measured)
-    target = measured / ("campaign" if name != "import" else "")
-    assert "input" in refusal(*commands(measured, target)[name], "--force")
-    assert content(measured) == before
 
 
 def test_a_pipe_is_not_taken_for_the_output(measured, tmp_path):

@@ -5,18 +5,14 @@ import subprocess
 import sys
 
 import click
-import numpy as np
 import pandas as pd
-import pytest
-import yaml
 from calling import call, succeed
 from click.testing import CliRunner
-from study_helpers import NINE, PROVENANCE, content, grid
+from study_helpers import PROVENANCE
 
 import accelstudy
 from accelstudy.commands.main import main
 from accelstudy.files.tables import write_table
-from accelstudy.schemes import get_scheme, scheme_families, scheme_names
 from accelstudy.sensors.models import MODELS
 
 
@@ -76,37 +72,6 @@ def test_help_imports_nothing_that_takes_long():
     assert run.stdout.splitlines()[-1] == "[]"
 
 
-# --- what there is to choose from ----------------------------------------------------------------
-
-
-def rows_of(text, names):
-    """Words of the lines that begin with one of the names."""
-    return {row[0]: row for row in map(str.split, text.splitlines()) if row and row[0] in names}
-
-
-def test_all_schemes_by_default():
-    text, table = output("schemes"), output("schemes", "--quiet").strip("\n")
-    rows = rows_of(text, scheme_names())
-    assert [*rows] == [*scheme_names()]
-    assert all(family in text for family in scheme_families())
-    assert rows["faces-6"][3:5] == ["6/9", "-"]
-    assert rows["faces-6"][-3:] == ["alpha_yz,", "alpha_zy,", "alpha_zx"]
-    assert rows["mclaren-24"][6] == "0.0667"  # m = 1/15
-    assert table in text
-    assert len(table.splitlines()) == 1 + len(scheme_names())
-
-
-def test_directions_of_a_scheme():
-    head, names, *lines = output("scheme", "faces-6").splitlines()
-    assert head.startswith("# ")
-    assert get_scheme("faces-6").source in head
-    assert names == "position,x,y,z,roll_gon,pitch_gon"
-    rows = [[float(cell) for cell in line.split(",")[1:]] for line in lines]
-    level, nose = (next(row[3:] for row in rows if row[axis] == 1) for axis in (2, 0))
-    assert (len(rows), level, nose[1]) == (6, [0, 0], -100)  # z down, and x down
-    assert all(np.linalg.norm(row[:3]) == pytest.approx(1) for row in rows)
-
-
 # --- the unit of angles --------------------------------------------------------------------------
 
 
@@ -130,22 +95,6 @@ def test_angles_in_degrees(monkeypatch):
 
 
 # --- a study -------------------------------------------------------------------------------------
-
-
-def test_cells(tmp_path):
-    base, over = tmp_path / "base.yaml", tmp_path / "over.yaml"
-    base.write_text(yaml.safe_dump(content(grids=[grid(schemes=["faces-6", "mclaren-24"])])))
-    _, *lines, gap, effort = output("cells", base).splitlines()
-    assert (gap, effort) == ("", "4 cells, up to 240 calibrations")
-    rows = [line.split(maxsplit=3) for line in lines]
-    assert rows[1:] == [
-        [f"{NINE}/faces-6/robot", "9", "60"],
-        [f"{NINE}/mclaren-24/gravity", "15", "60"],
-        [f"{NINE}/mclaren-24/robot", "63", "60"],
-    ]
-    assert rows[0][3].startswith("rank 6 of 9: alpha_yz, ")
-    over.write_text(yaml.safe_dump({"grids": [grid(approaches="robot", replicates=7)]}))
-    assert output("cells", base, over).splitlines()[1].split() == [rows[3][0], "63", "7"]
 
 
 def test_claims(tmp_path):

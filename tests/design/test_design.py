@@ -3,13 +3,12 @@
 import numpy as np
 import pytest
 from closed_forms import gravity_sigma, has_octahedral_moments, perfect_robot_ratio
-from scheme_helpers import KNOWN
 from usual import BOTH, GRAVITY, NINE, ROBOT, TWELVE
 
 from accelstudy.adjustment import calibrate
 from accelstudy.basics.units import MGON
 from accelstudy.design.estimability import estimability
-from accelstudy.schemes import get_scheme
+from accelstudy.schemes import get_scheme, scheme_names
 from accelstudy.sensors.models import get_model
 from accelstudy.simulation.sessions import Noise, session
 
@@ -34,7 +33,7 @@ def test_six_faces_determine_six_parameters_without_redundancy():
     assert found.condition == pytest.approx(1)
 
 
-@pytest.mark.parametrize("scheme", KNOWN)
+@pytest.mark.parametrize("scheme", scheme_names())
 def test_gravity_is_blind_to_rotations_and_a_robot_is_not(scheme):
     """Nine parameters need more than faces, and quadratic terms twelve positions."""
     found = design(scheme, TWELVE)

@@ -7,7 +7,6 @@ import pytest
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
 from places import SHARED
-from scheme_helpers import KNOWN
 from scipy.optimize import least_squares
 from scipy.spatial.transform import Rotation
 
@@ -60,9 +59,8 @@ def sphere_moment(*powers):
 # The registry
 
 
-def test_names_are_those_of_the_literature_and_more():
+def test_schemes_are_listed_by_their_size_beside_their_families():
     names = scheme_names()
-    assert tuple(name for name in names if name in KNOWN) == KNOWN
     sizes = [get_scheme(name).n_positions for name in names]
     assert sizes == sorted(sizes)
     assert {*scheme_families()} >= {
@@ -185,7 +183,9 @@ def test_generic_orientations_determine_cubic_terms_by_gravity(name):
     assert np.degrees(get_scheme(name).pole_distance) > 9
 
 
-@pytest.mark.parametrize("name", [name for name in KNOWN if get_scheme(name).n_positions > 17])
+@pytest.mark.parametrize(
+    "name", [name for name in scheme_names() if get_scheme(name).n_positions > 17]
+)
 def test_orders_keep_a_drift_apart_from_the_parameters(name):
     """A linear drift of each bias, beside the 9 parameters (norm) and beside the affine ones."""
     u = get_scheme(name).directions

@@ -13,7 +13,6 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 
 import pytest
-import yaml
 from places import ROOT
 from snakemake.benchmark import benchmarked
 from snakemake.cli import main
@@ -103,13 +102,6 @@ def _output_to(file):
         for number, copy in zip((1, 2), kept, strict=True):
             os.dup2(copy, number)
             os.close(copy)
-
-
-def run_workflow(name, folder, config, *words, **options):
-    """Run a workflow in a folder, with a configuration that is written there."""
-    (folder / "tiny.yaml").write_text(yaml.safe_dump(config), encoding="utf-8")
-    fixed = ["--snakefile", ROOT / "workflow" / f"{name}.smk", "--cores", 2]
-    return snakemake(folder, *fixed, "--configfile", "tiny.yaml", *words, **options)
 
 
 def jobs(text):

@@ -11,7 +11,7 @@ from usual import NINE
 from accelstudy.approaches import get_approach
 from accelstudy.campaign.calibration.fit import fit_campaign
 from accelstudy.diagnosis.space.frame import HoldColumns, signatures
-from accelstudy.effects import effect_names, get_effect
+from accelstudy.effects import get_effect
 from studies.hidden import physics
 from studies.hidden.physics.designs import APPROACHES, Course, session
 from studies.hidden.physics.generate import Case, generate
@@ -156,24 +156,6 @@ def test_what_is_called_invisible_leaves_nothing_and_what_is_outside_no_effect_e
 # --- physics outside the catalogue ---------------------------------------------------------------
 
 PLACED = {k: v for k, v in NOWHERE.items() if v.place}
-
-
-def test_there_is_physics_outside_over_all_coordinates_and_targets_and_over_none():
-    assert len(EFFECTS) >= 24
-    assert {*EFFECTS} <= {*effect_names()} - {effect.name for effect in NINE.effects}
-    assert len(OUTSIDE) >= 24
-    assert len(UNFORESEEN) >= 12
-    assert not {*OUTSIDE} & {*UNFORESEEN}
-    assert not {*OUTSIDE, *UNFORESEEN} & {*EFFECTS, *effect_names()}
-    assert {kind.place[0] for kind in OUTSIDE.values() if kind.place} == {
-        "force", "previous", "next", "angle", "yaw", "move", "vibration", "temperature", "dT/dt",
-        "time",
-    }  # fmt: skip
-    assert {kind.place[1] for kind in OUTSIDE.values() if kind.place} == {
-        "bias", "scale", "mounting", "tilt", "reading"
-    }  # fmt: skip
-    for kinds in (OUTSIDE, UNFORESEEN):
-        assert sum(kind.place is None for kind in kinds.values()) >= 5
 
 
 def holds(rng, n=40):

@@ -4,7 +4,6 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from hidden_sample import sample
 from scipy.stats import binomtest
 
 from accelstudy.campaign.calibration.fit import usual_approach
@@ -284,12 +283,6 @@ def test_a_page_with_every_target_and_every_error(judged, targets):
         assert f"| {row['figure']} | {row['campaigns']} |" in page
     assert "| refused | 1 |" in page
     assert "nan" not in page
-
-
-def test_the_sample_has_a_campaign_of_each_kind_or_size(judged):
-    sets = sample(judged["campaigns"])["set"]
-    assert sets.value_counts()["one"] == len({*judged["campaigns"].query("set == 'one'")["what"]})
-    assert sets.value_counts()["outside"] == 3
 
 
 def test_figures_of_much_and_of_nothing(judged):

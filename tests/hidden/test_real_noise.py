@@ -125,15 +125,6 @@ def test_plain_effects_in_white_noise_are_found(table):
     assert said[f"{NAME}/thermal_bias/300/not recorded"] != "right name"
 
 
-def test_with_and_without_its_column_it_is_the_same_session(table):
-    rows = table.set_index("cell")
-    with_it, without = (
-        rows.loc[f"{NAME}/thermal_bias/300/{how}", "effects"]
-        for how in ("recorded", "not recorded")
-    )
-    assert with_it == without
-
-
 def test_the_page_counts_every_campaign_once(campaigns):
     judged = frames(campaigns, OURS)
     page = score_page(OURS, judged, ORIGIN)

@@ -1,4 +1,4 @@
-"""The profiles for clusters fit the workflow; `make test-cluster` runs the one for SLURM."""
+"""The profile for SLURM fits the workflow; study/test_new_study.py plans a study with it."""
 
 import re
 

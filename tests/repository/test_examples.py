@@ -8,7 +8,6 @@ import pytest
 import quotes
 import yaml
 from example_helpers import EXAMPLES, run_example
-from golden import kept_of
 from page_helpers import numbers
 from pictures import BATCH, MADE_BY, REPORTS, overview, seen, stale
 from places import ROOT
@@ -46,14 +45,6 @@ def test_pictures_of_reports_show_what_the_reports_say(run, tmp_path):
     pages[BATCH[0]] = overview(*folders.values(), tmp_path / "batch")
     old = stale({name: seen(page) for name, page in pages.items()})
     assert not old, f"docs/figures has {', '.join(old)} of other pages; `{MADE_BY}` makes them anew"
-
-
-def test_the_start_page_quotes_the_plan_that_the_golden_set_keeps():
-    quoted = re.search(
-        r"```\{.text .wrap\}\n(.*?)```", (ROOT / "docs/start/index.md").read_text("utf-8"), re.S
-    )
-    printed = re.findall("^> (.*\n)", kept_of("plans")["docs-start-index"], re.M)
-    assert quoted[1] == "".join(printed[: quoted[1].count("\n")])
 
 
 def of_lines(text):

@@ -86,11 +86,6 @@ def test_what_people_read_of_an_effect(name):
     assert all(p.symbol.startswith("$") and p.symbol.endswith("$") for p in effect.parameters)
 
 
-def test_parameters_have_names_of_their_own():
-    names = [p.name for e in effect_names() for p in get_effect(e).parameters]
-    assert len(set(names)) == len(names)
-
-
 # --- formulas ------------------------------------------------------------------------------------
 
 # Each as the catalogue writes it, of f (n, 3), the forces before, the parameters and the holds.
@@ -192,13 +187,6 @@ def test_no_step_is_no_hysteresis():
     noisy = forces + np.random.default_rng(1).normal(0, 0.002, forces.shape)
     e = added(get_effect("hysteresis"), np.ones(3), noisy, some_hold(noisy)).output
     np.testing.assert_array_equal(e[[0, 1, 3, 5]], 0)
-
-
-def test_base_tilt_turns_with_the_same_matrix_as_gravity():
-    """A tilt (a, b) of the base is [a, b, 1] in place of [0, 0, 1] for the way that g points."""
-    attitude = Rotation.from_euler("ZYX", np.stack([HOLD.yaw, HOLD.pitch, HOLD.roll], axis=1))
-    level = np.stack(specific_force(HOLD.roll, HOLD.pitch, G), axis=1)
-    np.testing.assert_allclose(attitude.inv().apply([0, 0, -G]), level, rtol=0, atol=1e-12)
 
 
 def test_a_sensor_clips_what_it_reads():

@@ -88,16 +88,6 @@ def test_coloured_noise_is_a_stationary_gauss_markov_process(known_time):
     assert np.abs((covariance - expected) / deviation).max() < 5
 
 
-def test_coloured_noise_of_short_and_long_time_constants():
-    """An offset of its own in each hold, and one and the same in all."""
-    short = errors("coloured_noise(share=0.5, tau=0.01)")
-    assert near_variance(short, 2.0)
-    lag = short[:, 1:] * short[:, :-1]
-    assert abs(lag.mean()) < 4.5 * 2 / math.sqrt(lag.size)
-    constant = errors("coloured_noise(share=0.5, tau=1e15)") - errors()
-    np.testing.assert_allclose(constant, constant[:, :1] + 0 * constant, rtol=0, atol=1e-4)
-
-
 def test_heavy_tails_are_student_with_the_variance_of_sigma():
     nu = 9.0
     v = errors(f"heavy_tails(nu={nu})").ravel()

@@ -2,16 +2,13 @@
 
 import re
 import shutil
-import subprocess
 from itertools import product
 
 import numpy as np
 import pytest
 import yaml
-from calling import refusal, succeed
+from calling import succeed
 from campaign_helpers import made
-from page_helpers import assert_told_alike
-from places import ROOT
 
 from accelstudy.adjustment import calibrate
 from accelstudy.approaches import get_approach
@@ -34,10 +31,6 @@ WANTED = ("--tilt-accuracy", "10mgon", "--tilt-range", "30gon")
 
 def advise(folder, *options):
     return succeed("advise", folder, *WANTED, *options).output
-
-
-def error(folder, *options):
-    return refusal("advise", folder, *options)
 
 
 @pytest.fixture(scope="module")
@@ -83,19 +76,6 @@ def test_a_session_without_a_table_is_one_without_positions(begun):
     with_header_only = advise(folder)
     (folder / "positions.csv").unlink()
     assert advise(folder) == with_header_only
-
-
-@pytest.mark.parametrize("name", ["gravity", "robot"])
-def test_the_accuracy_is_that_of_the_calibration(begun, name):
-    measured = read_campaign(begun(16, name), running=True)
-    promise = Promise(10 * MGON, 50 * GON)
-    advice = advice_for(
-        measured, get_model(MODEL), get_approach(name), promise, candidate_positions("cube")
-    )
-    fit = fit_campaign(measured, get_model(MODEL), get_approach(name))
-    error_of = promise.tilt_error(fit.model, fit.parameters, fit.gravity, measured.hold)
-    np.testing.assert_allclose(advice.rms, error_of.rms_of_all(fit.covariance), rtol=1e-9)
-    assert advice.sigma_taken == measured.sigma_force
 
 
 def test_the_next_position_is_worth_more_than_others(begun):
@@ -274,33 +254,3 @@ def test_a_last_line_without_an_end_may_be_cut_off_and_is_not_counted(begun, end
 def test_attitudes_in_words(roll, pitch, frame, expected):
     force = np.array(specific_force(roll * GON, pitch * GON, 1.0))
     assert attitude(-force, parse_frame(frame)) == expected
-
-
-# --- the page ------------------------------------------------------------------------------------
-
-
-def test_the_page_can_be_followed_word_by_word(tmp_path, monkeypatch):
-    page = (ROOT / "docs/guides/sequential.md").read_text(encoding="utf-8")
-    monkeypatch.chdir(tmp_path)
-    blocks = re.findall(r"(?:^ {4}.*\n)+", page.partition("## To try it")[2], re.MULTILINE)
-    commands, answer, ways, arrive, last = (
-        [line[4:] for line in block.replace("\\\n", " ").splitlines()] for block in blocks[:5]
-    )
-
-    def follow(line):
-        if not line.startswith("accelstudy "):
-            return subprocess.run(["bash", "-c", line], check=True).stdout
-        return succeed(*line.split()[1:]).output
-
-    assert_told_alike([follow(line) for line in commands][-1], "\n".join(answer))
-    assert ways[0] == f"watch -n 2 {commands[-1]}"
-    assert "while read" in arrive[1]  # which takes its time
-    follow(arrive[0])
-    advices = [follow(commands[-1])]
-    for line in range(2, 28):
-        follow(f"sed -n {line}p whole/positions.csv >> running/positions.csv")
-        advices.append(follow(commands[-1]))
-    # The edges so far leave one angle open, though there are more positions than parameters.
-    assert "not determined yet: alpha_yz" in advices[14]
-    assert next(i for i, said in enumerate(advices) if "YOU CAN STOP" in said) == 16
-    assert "ACCEPTED" in follow(last[0])

@@ -17,7 +17,6 @@ from accelstudy.design.estimability import estimability
 from accelstudy.files import tables
 from accelstudy.files.tables import git_commit, read_origin, read_table, write_table
 from accelstudy.study import tables as module
-from accelstudy.study.cell import memory
 from accelstudy.study.replicates import ESTIMATES
 from accelstudy.study.statistics import statistics
 from accelstudy.study.tables import collect, read_estimates
@@ -208,8 +207,3 @@ def test_sigmas_that_no_weights_span_are_said():
     found = estimability(cell.positions, cell.estimated_model, cell.conditions, cell.noise)
     assert not found.estimable
     assert "the sigmas differ too much" in found.reason
-
-
-def test_a_job_asks_for_the_memory_of_its_largest_cell():
-    cells = make_cells(grid(replicates=20_000), grid(schemes="rings-24", replicates=10)).values()
-    assert memory([*cells]) == 1000 + round(150e-6 * 20_000 * 9)

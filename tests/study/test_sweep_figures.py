@@ -160,8 +160,3 @@ def test_other_factors_are_held_at_a_value_that_is_stated(grids, factor, held, x
     rows = swept(study_of(*grids), factor).dropna(subset="x")
     (said,) = set(rows["held"])
     assert (said.split("\n"), sorted(set(rows["x"]))) == (held, x)
-
-
-def test_what_does_not_vary_is_not_swept():
-    study = study_of(grid(gravity_error_mps2=ERRORS))
-    assert all(swept(study, factor).empty for factor in FACTORS if factor is not GRAVITY_ERROR)

@@ -284,13 +284,6 @@ def test_lint(snakefile, config, tmp_path):
     assert "Congratulations" in result.stdout
 
 
-def test_every_rule_has_a_name_of_its_own():
-    files = [ROOT / "workflow" / "Snakefile", *(ROOT / "workflow").rglob("*.smk")]
-    text = "\n".join(path.read_text(encoding="utf-8") for path in files)
-    names = re.findall(r"^(?:use rule \w+ as|rule) (\w+)", text, re.MULTILINE)
-    assert sorted(names) == sorted({*names})
-
-
 def check_report(folder, results):
     """Check that a report has all figures with titles and captions."""
     with zipfile.ZipFile(folder / "report.zip") as archive:

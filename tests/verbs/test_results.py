@@ -2,11 +2,9 @@
 
 import json
 import pickle
-import re
 import sys
 from copy import copy
 from subprocess import run
-from textwrap import dedent
 
 import matplotlib
 import numpy as np
@@ -294,49 +292,6 @@ def test_what_reading_refuses_is_diagnosed(tmp_path):
     with pytest.raises(acs.InputError, match="look like g"):
         acs.read_campaign(tmp_path)
     assert acs.diagnose(acs.read_campaign(tmp_path, plausible=False)).state == "gross_error"
-
-
-SCRIPTS = {
-    "calibrate, save and apply": """
-        import accelstudy as acs
-        campaign = acs.find_holds("imu.csv", rate=100, columns="fx=ax,fy=ay,fz=az")
-        calibration = acs.calibrate(campaign)
-        calibration.save("saved")
-        found = calibration.apply("imu.csv")
-    """,
-    "load and apply": """
-        import accelstudy as acs
-        found = acs.read_calibration("calibrated").apply("imu.csv", sigma="10 mm/s^2")
-    """,
-    "compare two": """
-        import accelstudy as acs
-        comparison = acs.compare("calibrated-0", "calibrated-1", tilt_range="30 gon")
-        found = comparison.to_frame()
-    """,
-    "a lot": """
-        import accelstudy as acs
-        lot = acs.lot(["sensor-1", "sensor-2"])
-        found = lot.to_frame()
-    """,
-    "intervals with covariance": """
-        import accelstudy as acs
-        calibration = acs.calibrate("sensor-0")
-        found = calibration.intervals(0.99).join(calibration.covariance)
-    """,
-}
-"""What users write: at most six lines, and nothing but names of the package."""
-
-
-@pytest.mark.parametrize("task", SCRIPTS)
-def test_a_script_of_a_user_takes_six_lines(guide, folder, calibrations, task, monkeypatch):
-    monkeypatch.chdir(guide["folder"] if "apply" in task else folder)
-    text = dedent(SCRIPTS[task]).strip()
-    assert len(text.splitlines()) <= 6
-    assert re.findall(r"import .*", text) == ["import accelstudy as acs"]
-    names = {}
-    exec(text, names)
-    assert isinstance(names["found"], pd.DataFrame)
-    assert len(names["found"]) > 0
 
 
 # --- the front door ------------------------------------------------------------------------------
