@@ -217,15 +217,6 @@ def test_any_damage_of_a_data_sheet_is_one_line(whole, damage):
         assert "\n" not in said
 
 
-def test_a_sensor_that_knows_nothing_and_a_gravity_that_knows_little_more(whole):
-    def damage(content):
-        known = {"gravity": {"value_mps2": 9.8, "sigma_mps2": 1}}
-        return json.dumps({**yaml.safe_load(content), **known, "sensor_noise": {"sigma_mps2": 1e3}})
-
-    for command in OF_CAMPAIGN:
-        read(whole, "campaign/campaign.yaml", command, lambda content: damage(content).encode())
-
-
 # --- options ------------------------------------------------------------------------------------
 
 HOSTILE = [

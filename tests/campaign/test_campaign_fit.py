@@ -11,7 +11,6 @@ from accelstudy.basics.errors import InputError
 from accelstudy.campaign.calibration.fit import fit_campaign, initial_values
 from accelstudy.campaign.calibration.wording import verdict_lines
 from accelstudy.schemes import get_scheme
-from accelstudy.sensors.models import get_model
 
 
 @pytest.mark.parametrize("approach", [GRAVITY, ROBOT], ids=lambda a: a.name)
@@ -33,11 +32,6 @@ def test_initial_values_are_the_sphere():
         | {"alpha_yz": 0, "alpha_zy": 0, "alpha_zx": 0},
         abs=1e-12,
     )
-
-
-def test_a_nonlinear_model_has_no_matrix():
-    model = get_model("bias-scale-nonorthogonality-quadratic")
-    assert model.affine(model.vector({"k2_x": 1e-3})) is None
 
 
 @pytest.mark.parametrize(("bumped", "said"), [

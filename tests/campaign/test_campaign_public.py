@@ -3,10 +3,8 @@
 import hashlib
 
 import pytest
-from calling import refused, succeed
-from places import DATA, needs_data
+from calling import refused
 
-from accelstudy.campaign.format import read_campaign
 from accelstudy.campaign.importing import public
 from accelstudy.campaign.importing.public import (
     PublicData,
@@ -45,14 +43,6 @@ def test_the_registry_says_how_a_file_is_read(name):
         assert (settings.scale is not None) == (settings.unit == "counts")
         timed = settings.rate is not None or settings.time is not None
         assert settings.means or settings.block is not None or timed
-
-
-@needs_data
-def test_command(tmp_path):
-    result = succeed("public", "mpu6050", "--out", tmp_path / "out", "--folder", DATA)
-    assert "holds: 10" in result.output
-    assert read_campaign(tmp_path / "out").header.sensor == "MPU-6050"
-    assert (tmp_path / "out" / "segmentation.png").exists()
 
 
 def test_a_file_that_is_there_is_not_downloaded(tmp_path, fetch):

@@ -7,16 +7,12 @@ from tempfile import TemporaryDirectory
 import numpy as np
 import pandas as pd
 import pytest
-from hypothesis import HealthCheck, example, given, settings
+from hypothesis import given, settings
 from hypothesis import strategies as st
 from log_helpers import FORCES, TABLE, TIME, N, changed, lines, open_log
 from scipy.io import loadmat, savemat
 
 import accelstudy as acs
-from accelstudy.basics.errors import InputError
-from accelstudy.campaign.importing import text as texts
-from accelstudy.campaign.importing.holds import find_holds
-from accelstudy.campaign.importing.settings import ImportSettings
 
 
 def written(folder, text, name="log.csv"):
@@ -143,24 +139,6 @@ def test_a_row_that_lacks_a_reading_is_left_out_and_said(tmp_path, text, row, sa
     assert warning == f"1 of 50 rows left out, as a reading is missing or absurd: {says}"
 
 
-@pytest.mark.parametrize("text", [
-    "\n".join(" ".join(["word"] * (i % 200)) for i in range(400)),
-    "\n".join(f"{i},{'a,' * (i % 300)}" for i in range(500)), '"1"\n' * 5000,
-    ",".join(['"1.5"'] * 5000),
-])  # fmt: skip
-def test_what_is_no_table_is_no_more_work_than_its_size(tmp_path, monkeypatch, text):
-    looked_at, split = [], texts.split_line
-
-    def counting(line, delimiter):
-        looked_at.append(len(line))
-        return split(line, delimiter)
-
-    monkeypatch.setattr(texts, "split_line", counting)
-    with pytest.raises(InputError):
-        open_log(written(tmp_path, text), rate=1)
-    assert sum(looked_at) < 20 * len(text)
-
-
 @pytest.mark.parametrize("note", ['a "start', 'so-called "x" and "y', '5",1,"'])
 def test_a_quotation_mark_that_does_not_close_swallows_no_rows(tmp_path, note):
     """The rows up to the next mark were one cell of the unused column."""
@@ -172,38 +150,3 @@ def test_a_quotation_mark_that_does_not_close_swallows_no_rows(tmp_path, note):
     np.testing.assert_array_equal(log.time, TIME[whole])
     np.testing.assert_array_equal(log.forces, FORCES[whole])
     assert len(log.warnings()) == (not whole.all())
-
-
-cells = st.one_of(
-    st.floats(-20, 20).map(str),
-    st.sampled_from(["nan", "", "1e400", "-", '"', "1_0", "a", "0x1", "1,5", "True", "1e15"]),
-    st.text("01.,;# \t%\"'\r\x00eE-+a\u2028é", max_size=6),
-)
-
-
-@settings(
-    max_examples=80,
-    suppress_health_check=[HealthCheck.function_scoped_fixture, HealthCheck.too_slow],
-)
-@given(
-    st.lists(st.lists(cells, max_size=6), max_size=40),
-    st.sampled_from([",", ";", " ", "\t", ", "]),
-    st.sampled_from([{"rate": 100.0}, {"rate": 3.0}, {"time": 0}, {}]),
-    st.sampled_from([None, {"fx": 0, "fy": 1, "fz": 2}, {"fx": 3, "fy": 1, "fz": 2}]),
-)
-@example([["1", "2", "3"], ["1", "2", "3", "4"], ["2", "3", "4"]], ",", {"rate": 9.0}, None)
-@example([['"'], ["0.0", "0.0", '"']], ",", {"rate": 100.0}, None)
-@example([["1_0", "\u2028", "1", "1", "\u2028"], ["1e400"]], " ", {"rate": 100.0}, None)
-@example([["1", "", "2", '"\n,1,nan\n"', "\t", "#"]], ",", {"rate": 100.0}, None)
-def test_whatever_the_text(tmp_path, rows, separator, timing, columns):
-    path = tmp_path / "log.csv"
-    path.write_text("\n".join(separator.join(row) for row in rows), encoding="utf-8")
-    message = ""
-    try:
-        log = open_log(path, columns=columns, **timing)
-        assert len(log.time) == len(log.forces)
-        assert np.isfinite(log.forces).all()
-        find_holds(log, ImportSettings(shortest=0.1, window=0.5))
-    except InputError as error:  # nothing else passes
-        message = str(error)
-    assert len(message.splitlines()) <= 1

@@ -8,7 +8,6 @@ from places import DATA, needs_data
 from stand_ins import drawn
 
 import accelstudy as acs
-from accelstudy.basics.errors import InputError
 from accelstudy.basics.units import GON, MGON
 from accelstudy.campaign.format import read_campaign
 from accelstudy.campaign.header import LogLayout
@@ -93,8 +92,6 @@ def test_numbers_with_a_scale_are_counts(turned):
     found = acs.find_holds(table(raw), rate=RATE, scale=0.001)
     assert found.header.unit == expected.header.unit == "counts"
     np.testing.assert_array_equal(found.forces, expected.forces)
-    with pytest.raises(InputError, match="goes with unit counts, not g"):
-        acs.find_holds(table(raw), rate=RATE, unit="g", scale=0.001)
 
 
 def test_temperature_vibration_and_range(turned):
@@ -158,6 +155,28 @@ def test_a_machine_that_hums_is_still():
     hum = 2 * np.sin(2 * np.pi * 29.3 * np.arange(9000) / RATE)[:, None] * [1, 0.3, 0.5]
     forces = [0, 0, -G] + hum + 0.02 * rng.standard_normal((9000, 3))
     assert acs.find_holds(table(forces), rate=RATE).n_positions == 1
+
+
+def moved(turn, size, cut):
+    """Forces where a sensor turns about its y axis, rad/s, and is shaken below a frequency, Hz."""
+    rng, n = np.random.default_rng(1), 9000
+    angle, frequency = turn * np.arange(n) / RATE, np.fft.rfftfreq(n, 1 / RATE)
+    turning = G * np.column_stack([np.sin(angle), 0 * angle, -np.cos(angle)])
+    spectrum = np.fft.rfft(rng.standard_normal((n, 3)), axis=0)
+    spectrum[(frequency > cut) | (frequency == 0)] = 0
+    shaken = np.fft.irfft(spectrum, n, axis=0)
+    return turning + size * shaken / shaken.std() + 0.02 * rng.standard_normal((n, 3))
+
+
+@pytest.mark.parametrize(("turn", "size", "cut"), [
+    (0.5, 4.0, 3),  # waved about
+    (0.1, 0.4, 2),  # turned gently by hand
+    (0.02, 0.0, 1),  # on a turntable
+    (0.0, 2.0, 3),  # carried upright
+])  # fmt: skip
+def test_a_sensor_that_moves_all_the_time_was_never_still(turn, size, cut):
+    with refused("the sensor was never still: "):
+        acs.find_holds(table(moved(turn, size, cut)), rate=RATE)
 
 
 # --- Holds by hand -------------------------------------------------------------------------------

@@ -1,7 +1,5 @@
 """A calibrated sensor beside the one that is calibrated: the import of its log."""
 
-import json
-
 import numpy as np
 import pandas as pd
 import pytest
@@ -130,23 +128,6 @@ REFUSED = {
 def test_logs_that_tell_no_angles(plate, log):
     with refused(*REFUSED[log]):
         imported(plate, log)
-
-
-def test_calibrations_that_tell_no_angles(plate, tmp_path):
-    path = tmp_path / "calibration.json"
-    content = json.loads((plate / "ref" / "calibration.json").read_text())
-    quality = {**content["quality"], "plausible": False, "warnings": ["s_x is 0.5"]}
-    more = [{**content["parameters"][0], "name": f"b_T_{axis}"} for axis in "xyz"]
-    warm = {"effects": [*content["effects"], "thermal_bias"], "covariance": np.eye(12).tolist()}
-    for change, *parts in (
-        ({"covariance": [[None] * 9] * 9}, "no covariance matrix"),
-        ({"quality": quality}, "do not use this calibration: s_x is 0.5"),
-        ({**warm, "parameters": [*content["parameters"], *more]},
-         "reference", "thermal_bias needs the temperature"),
-    ):  # fmt: skip
-        path.write_text(json.dumps({**content, **change}))
-        with refused(*parts):
-            imported(plate, "ref.csv", path)
 
 
 def test_angles_in_the_log_are_not_used(plate):

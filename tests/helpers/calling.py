@@ -17,7 +17,7 @@ def call(*words):
 def succeed(*words):
     """Result of a command that must end well."""
     result = call(*words)
-    assert result.exit_code == 0, f"{words}: {result.output}"
+    assert result.exit_code == 0, f"{words}: {result.output}{result.exception!r}"
     return result
 
 

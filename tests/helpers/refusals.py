@@ -32,6 +32,7 @@ import yaml
 from calling import call, succeed
 from log_helpers import by_hand, table
 from places import ROOT
+from scipy.io import savemat
 from study_helpers import content as study_content
 
 import accelstudy as acs
@@ -54,6 +55,7 @@ def texts(folder):
     for name in ("hidden-effects", "real-noise"):
         shutil.copy(ROOT / f"studies/hidden/config/{name}.yaml", sound)
     table(forces, t=time)[["t", "fx", "fy", "fz"]].to_csv(sound / "log.csv", index=False)
+    savemat(sound / "arrays.mat", {"log": forces, "other": forces, "complex": 1j * forces})
     _, *parts = re.split(r"^# (.+)\n", SCRIPT.read_text("utf-8"), flags=re.MULTILINE)
     undrawn = mock.patch.object(stand_ins.saving, "_element", stand_ins.element)
     with mock.patch.dict(os.environ, ENVIRONMENT), undrawn:

@@ -10,10 +10,10 @@ ELEMENT, SAVE = saving._element, saving.save
 STAND_IN = "<svg></svg>"
 
 
-def element(_, folder, name):
+def element(_, folder, name, kinds):
     """Write files in place of a figure, and return the element that stands for it on the page."""
-    for path in (folder / f"{name}.svg", folder / f"{name}.png"):
-        write(path)
+    for kind in kinds:
+        write(folder / f"{name}.{kind}")
     return STAND_IN
 
 
