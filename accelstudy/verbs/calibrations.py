@@ -218,14 +218,12 @@ def export(calibration: Calibration | str | PathLike[str], *, form: str = "c") -
     --------
         accelstudy export calibrated/calibration.json --form c
     """
-    from accelstudy.campaign.calibration.export import export as text_of
-    from accelstudy.campaign.calibration.export import losses
+    from accelstudy.campaign.calibration.export import export as write
     from accelstudy.campaign.calibration.sensor_calibration import sensor_of
 
-    sensor = sensor_of(calibration)
-    text = text_of(sensor, form)
-    for loss in losses(sensor, form):
-        warn(loss)
+    text, warnings = write(sensor_of(calibration), form)
+    for warning in warnings:
+        warn(warning)
     return text
 
 

@@ -58,16 +58,13 @@ def c_header(calibration: SensorCalibration, real: str = "float") -> str:
     calibration.check_device()
     model, p, raw = calibration.model, calibration.parameters, calibration.conversion
     frame, write = calibration.usual_layout.axes, _Writer(real)
-    # Counts lose no digits of a float if their offset is a whole number of them.
-    offset = np.broadcast_to(raw.offset, 3)
-    whole = np.round(offset)
+    offset, zero = np.broadcast_to(raw.offset, 3), np.zeros(3)
     linear = calibration.mending @ frame.matrix * raw.scale
-    constant = linear @ (whole - offset)
     lines, output, columns, steps = list[str](), list[str](), set[str](), 1
     if affine := model.affine(p):
         k, bias = affine
         k = frame.matrix.T @ k
-        force = write.affine("force", k @ linear, "reading", whole, k @ (constant - bias))
+        force = write.affine("force", k @ linear, "reading", offset, -k @ bias)
     else:
         out, slope = _output(calibration)
         entries = {f"slope[{i}][{j}]": slope[i, j] for i in range(3) for j in range(3)}
@@ -75,8 +72,8 @@ def c_header(calibration: SensorCalibration, real: str = "float") -> str:
         columns = {str(symbol) for symbol in out.free_symbols - {*symbols(*FORCE)}}
         steps = _steps(calibration) if slope.free_symbols & {*symbols(*FORCE)} else 1
         body = frame.matrix.T @ model.axes_matrix(p)
-        output = write.affine("output", linear, "reading", whole, constant)
-        force = write.affine("force", body, "f", np.zeros(3), np.zeros(3))
+        output = write.affine("output", linear, "reading", offset, zero)
+        force = write.affine("force", body, "f", zero, zero)
     return render_text(
         "campaign/calibration/calibration.h.j2",
         version=__version__,

@@ -10,7 +10,7 @@ import numpy as np
 from accelstudy.basics.errors import InputError, UnknownNameError
 from accelstudy.basics.wording import comma_list
 from accelstudy.campaign.calibration.c_code import c_header
-from accelstudy.campaign.calibration.px4 import px4_losses, px4_parameters
+from accelstudy.campaign.calibration.px4 import px4_parameters
 from accelstudy.campaign.calibration.sensor_calibration import SensorCalibration
 from accelstudy.sensors.sensor import not_affine
 
@@ -38,30 +38,29 @@ def matrix_text(calibration: SensorCalibration) -> str:
     return "".join(" ".join(f"{value: .12e}" for value in row) + "\n" for row in rows)
 
 
-WRITERS: dict[str, Callable[[SensorCalibration], str]] = {
+FORMS: dict[str, Callable[[SensorCalibration], str | tuple[str, list[str]]]] = {
     "c": c_header,
     "c-double": partial(c_header, real="double"),
     "matrix": matrix_text,
     "px4": px4_parameters,
 }
-"""Forms: a header in C99, plain 3 × 4 numbers, and a file of parameters."""
+"""Forms: a header in C99, plain 3 × 4 numbers, and a file of parameters with what it lacks."""
 
 
-def export(calibration: SensorCalibration, form: str) -> str:
-    """Text of a calibration in one of the forms of `WRITERS`.
+def export(calibration: SensorCalibration, form: str) -> tuple[str, list[str]]:
+    """Text of a calibration in one of `FORMS`, and sentences on what the user should know of it.
 
     Raises
     ------
     UnknownNameError, InputError
         If there is no such form, or it cannot hold the calibration.
     """
-    if form not in WRITERS:
-        raise UnknownNameError("form", form, WRITERS)
-    return WRITERS[form](calibration)
-
-
-def losses(calibration: SensorCalibration, form: str) -> list[str]:
-    """What a form cannot hold of a calibration, a sentence each; and whether data were mended."""
+    if form not in FORMS:
+        raise UnknownNameError("form", form, FORMS)
+    written = FORMS[form](calibration)
+    text, lost = (written, []) if isinstance(written, str) else written
     mended = calibration.document.mended
-    reasons = [f"the calibration is of mended data: {mended.reason}"] if mended else []
-    return [*reasons, *(px4_losses(calibration) if form == "px4" else [])]
+    return text, [
+        *([f"the calibration is of mended data: {mended.reason}"] if mended else []),
+        *lost,
+    ]

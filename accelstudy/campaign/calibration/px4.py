@@ -32,14 +32,14 @@ ATTITUDES = 60
 """Attitudes, each mirrored in all axes, over which the parameters are fitted."""
 LOSS_ATTITUDES = 200
 """Attitudes over which the loss is taken."""
-MIN_LOSS = 0.01 * MGON
+MIN_LOSS_MGON = 0.01
 """Error of an angle below which nothing is lost."""
 DEGREE = 3
 """Degree of the polynomials of PX4 in the temperature."""
 
 
-def px4_parameters(calibration: SensorCalibration) -> str:
-    """Write the file that QGroundControl loads.
+def px4_parameters(calibration: SensorCalibration) -> tuple[str, list[str]]:
+    """Write the file that QGroundControl loads, and say what PX4 cannot hold, a sentence each.
 
     Raises
     ------
@@ -47,7 +47,11 @@ def px4_parameters(calibration: SensorCalibration) -> str:
         If an effect depends on what no device knows, no force explains a reading, or readings are
         not in m/s².
     """
-    lost = px4_losses(calibration)
+    calibration.check_device()
+    if (unit := calibration.usual_layout.unit) != "m/s^2":
+        raise InputError(
+            f"PX4 takes readings in m/s^2, and this calibration is of readings in {unit}"
+        )
     gains, offsets = _fit(calibration)
     values: dict[str, float] = {}
     for i, axis in enumerate("XYZ"):
@@ -59,31 +63,24 @@ def px4_parameters(calibration: SensorCalibration) -> str:
         for i, powers in enumerate(offsets):
             values |= {f"TC_A0_X{k}_{i}": x if k else 0.0 for k, x in enumerate(powers)}
     shown = {name: _positional(value) for name, value in sorted(values.items())}
+    lags = [
+        (effect.name, tau)
+        for effect in calibration.model.effects
+        if effect.family == "temperature" and (tau := effect.settings.get("tau"))
+    ]
+    loss = _loss(calibration, gains, offsets) / MGON
+    lost = render_lines(TEMPLATE, "losses", *loss, loss.max() > MIN_LOSS_MGON, lags, MAX_TILT_GON)
     axes = calibration.usual_layout.axes
-    content = calibration, __version__, lost, axes, is_warmed, shown
-    return "\n".join(render_lines(TEMPLATE, "parameters", *content)) + "\n"
+    lines = render_lines(
+        TEMPLATE, "parameters", calibration, __version__, lost, axes, is_warmed, shown
+    )
+    return "\n".join(lines) + "\n", lost
 
 
 def _positional(value: float) -> str:
     """Nine digits; readers take a number without a point for an integer, or for none."""
     rounded = np.round(value, 15) + 0.0  # 0 has no sign
     return np.format_float_positional(rounded, 9, unique=False, fractional=False, trim="0")
-
-
-def px4_losses(calibration: SensorCalibration) -> list[str]:
-    """Say what PX4 cannot hold, and what that does to roll and pitch; errors as above."""
-    calibration.check_device()
-    unit = calibration.usual_layout.unit
-    if unit != "m/s^2":
-        raise InputError(
-            f"PX4 takes readings in m/s^2, and this calibration is of readings in {unit}"
-        )
-    rms, largest = _loss(calibration)
-    effects = calibration.model.effects
-    lags = [(effect.name, tau) for effect in effects if (tau := effect.settings.get("tau"))
-            and effect.family == "temperature"]  # fmt: skip
-    is_lost = largest.max() > MIN_LOSS
-    return render_lines(TEMPLATE, "losses", is_lost, rms / MGON, largest / MGON, lags, MAX_TILT_GON)
 
 
 def _is_warmed(calibration: SensorCalibration) -> bool:
@@ -125,12 +122,11 @@ def _fit(calibration: SensorCalibration) -> tuple[Array, Array]:
     return fitted[:, 0], fitted[:, 1:]
 
 
-def _loss(calibration: SensorCalibration) -> tuple[Array, Array]:
-    """Rms and largest error, (2,), of roll and of pitch by what PX4 cannot hold, rad."""
-    gains, offsets = _fit(calibration)
+def _loss(calibration: SensorCalibration, gains: Array, offsets: Array) -> Array:
+    """Rms and largest error, (2, 2), of roll and of pitch by what PX4 cannot hold, rad."""
     cap = cap_forces(MAX_TILT_GON * GON, LOSS_ATTITUDES, calibration.gravity)
     forces, readings, terms = _readings(calibration, cap)
-    corrected = (readings - terms @ offsets.T) / gains
     frame = calibration.usual_layout.axes
-    error = wrap_angle(angles_of(frame.to_frd(corrected)) - angles_of(forces))
-    return np.sqrt(np.mean(error**2, axis=0)), np.abs(error).max(axis=0)
+    corrected = frame.to_frd((readings - terms @ offsets.T) / gains)
+    error = wrap_angle(angles_of(corrected) - angles_of(forces))
+    return np.array([np.sqrt(np.mean(error**2, axis=0)), np.abs(error).max(axis=0)])
