@@ -15,14 +15,7 @@ from matplotlib.axes import Axes
 from accelstudy.approaches import Approach
 from accelstudy.basics import suggestions
 from accelstudy.basics.errors import InputError
-from accelstudy.basics.levels import (
-    ACCEPTED,
-    BLIND,
-    IMPLAUSIBLE,
-    REFUTATION_LEVEL,
-    REJECTED,
-    UNCHECKED,
-)
+from accelstudy.basics.levels import ACCEPTED, BLIND, IMPLAUSIBLE, REJECTED, UNCHECKED
 from accelstudy.basics.names import path_name
 from accelstudy.basics.progress import say, show, track, warn
 from accelstudy.basics.units import MGON, display_unit, to_display
@@ -103,7 +96,7 @@ class Batch(Result):
         self.sources: dict[str, str] = {}
         self.calibrations: dict[str, Calibration] = {}
         self.failed: dict[str, str] = {}
-        self._chosen = model.name, None if approach is None else approach.name
+        self._chosen = {"model": model.name, "approach": approach and approach.name}
         for given in track(campaigns, "campaigns"):
             source = given.name if isinstance(given, Campaign) else os.path.normpath(given)
             name = path_name(Path(os.path.abspath(source)).name, "campaign")
@@ -137,20 +130,24 @@ class Batch(Result):
     @cached_property
     def _rows(self) -> list[dict[str, Any]]:
         """The table of campaigns, a mapping for each."""
-        documents = []
-        for name, source in self.sources.items():
-            content: dict[str, Any] = dict(zip(("model", "approach"), self._chosen, strict=True))
-            if name in self.failed:
-                content |= {"error": self.failed[name], "quality": {"state": FAILED}}
-            else:
-                content = dict(self.calibrations[name].content)
-                suspects = (str(each["position"]) for each in content["quality"]["suspects"])
-                content |= {"suspects": ", ".join(suspects)}
-                content |= {"warnings": "\n".join(self.calibrations[name].warnings)}
-            documents.append({**content, "name": name, "source": source})
-        flat = pd.json_normalize(documents).astype(object)
-        flat = flat.where(flat.notna(), None)
-        table = pd.DataFrame({column: flat.get(key) for column, key in COLUMNS.items()})
+        failed = {
+            name: {**self._chosen, "error": error, "quality": {"state": FAILED}}
+            for name, error in self.failed.items()
+        }
+        calibrated = {
+            name: {
+                **one.content,
+                "suspects": ", ".join(
+                    str(n["position"]) for n in one.content["quality"]["suspects"]
+                ),
+                "warnings": "\n".join(one.warnings),
+            }
+            for name, one in self.calibrations.items()
+        }
+        documents = failed | calibrated
+        rows = [{**documents[k], "name": k, "source": v} for k, v in self.sources.items()]
+        flat = pd.json_normalize(rows).reindex(columns=[*COLUMNS.values()]).astype(object)
+        table = flat.where(flat.notna(), None).set_axis([*COLUMNS], axis=1)
         return [{str(k): v for k, v in row.items()} for row in table.to_dict("records")]
 
     def to_frame(self) -> pd.DataFrame:
@@ -188,17 +185,13 @@ class Batch(Result):
             (own := folder / EACH / name).mkdir(parents=True)
             calibration.write(own, place / EACH / name)
         write_table(folder / "parameters.parquet", self.parameters)
-        of_state = {state: [r for r in self._rows if r["state"] == state] for state in STATES}
-        calibrated = [r for r in self._rows if r["state"] not in (FAILED, IMPLAUSIBLE)]
         write_page(
             folder / "report.html",
             "campaign/batch.html.j2",
             self.verdict,
             verdict=self.verdict,
-            unusable=of_state[FAILED] + of_state[IMPLAUSIBLE],
-            calibrated=calibrated,
+            rows=sorted(self._rows, key=lambda row: STATES.index(row["state"])),
             each=EACH,
-            level=REFUTATION_LEVEL,
             blind=BLIND,
             next_steps=[*self._next_steps(place)],
         )
