@@ -22,12 +22,27 @@ from accelstudy.files.validation import validate
 Array = NDArray[np.float64]
 
 
+def _of_holds(attribute: str) -> cached_property[Any]:
+    """Array of the columns of an attribute, of the holds that are used; None without them."""
+    names = COLUMNS[attribute].names
+
+    def array(campaign: Campaign) -> Any:
+        if names[0] not in campaign.holds:
+            return None
+        columns = [campaign.holds[name].to_numpy()[campaign.used] for name in names]
+        array = np.column_stack(columns) if len(names) > 1 else columns[0]
+        array.setflags(write=False)  # a change would not reach the table
+        return array
+
+    return cached_property(array)
+
+
 @dataclass(frozen=True, eq=False, repr=False)
 class Campaign:
     """One calibration session of one sensor: a header, and a table of static holds.
 
-    Arrays, such as `forces`, are of the n holds that are used. No calculation takes holds that are
-    left out by mistake, while `hold` still knows what came before a hold.
+    Arrays are of the n holds that are used, in SI; what is unknown is None. No calculation takes
+    holds that are left out by mistake, while `hold` still knows what came before a hold.
 
     Attributes
     ----------
@@ -39,6 +54,14 @@ class Campaign:
     notes : tuple of str, what the import of its log found and assumed
     sensor_type : SensorType, optional, what other sensors of the type tell of this one
     truth : mapping, of a simulated campaign: the settings, and all that was drawn
+    forces : (n, 3) array, m/s², mean specific forces in sensor axes
+    angles : (n, 2) array, rad, roll and pitch that the robot tells, or a reference
+    yaw : (n,) array, rad, that the robot tells
+    n_samples : (n,) array, samples in the holds
+    sd : (n, 3) array, m/s², standard deviations of the samples within the holds
+    time : (n,) array, s, middle of the holds since the start of the session
+    temperature : (n,) array, °C
+    vibration : (n,) array, m/s², rms
     """
 
     header: Header
@@ -47,6 +70,10 @@ class Campaign:
     notes: tuple[str, ...] = ()
     sensor_type: SensorType | None = None
     truth: Mapping[str, Any] = field(default_factory=dict)
+
+    forces, angles, yaw = _of_holds("forces"), _of_holds("angles"), _of_holds("yaw")
+    n_samples, sd, time = _of_holds("n_samples"), _of_holds("sd"), _of_holds("time")
+    temperature, vibration = _of_holds("temperature"), _of_holds("vibration")
 
     @classmethod
     def of(cls, content: Mapping[str, Any], **arrays: Any) -> Campaign:
@@ -117,58 +144,6 @@ class Campaign:
     def positions(self) -> NDArray[np.int_]:
         """Numbers of the holds, (n,)."""
         return self.holds.index.to_numpy()[self.used]
-
-    @cached_property
-    def forces(self) -> Array:
-        """Mean specific forces in sensor axes, (n, 3), m/s²."""
-        forces = self._array("forces")
-        assert forces is not None
-        return forces
-
-    @cached_property
-    def angles(self) -> Array | None:
-        """Roll and pitch that the robot tells, or a reference, (n, 2), rad; None without one."""
-        return self._array("angles")
-
-    @cached_property
-    def n_samples(self) -> NDArray[np.int_] | None:
-        """Samples in the holds, (n,)."""
-        return self._array("n_samples")
-
-    @cached_property
-    def sd(self) -> Array | None:
-        """Standard deviations of the samples within the holds, (n, 3), m/s²."""
-        return self._array("sd")
-
-    @cached_property
-    def time(self) -> Array | None:
-        """Middle of the holds since the start of the session, (n,), s."""
-        return self._array("time")
-
-    @cached_property
-    def temperature(self) -> Array | None:
-        """Temperature of the holds, (n,), °C."""
-        return self._array("temperature")
-
-    @cached_property
-    def vibration(self) -> Array | None:
-        """Vibration of the holds, rms, (n,), m/s²."""
-        return self._array("vibration")
-
-    @cached_property
-    def yaw(self) -> Array | None:
-        """Yaw that the robot tells, (n,), rad."""
-        return self._array("yaw")
-
-    def _array(self, attribute: str) -> Any:
-        """Array of the holds that are used, of the columns of an attribute."""
-        names = COLUMNS[attribute].names
-        if names[0] not in self.holds:
-            return None
-        columns = [self.holds[name].to_numpy()[self.used] for name in names]
-        array = np.column_stack(columns) if len(names) > 1 else columns[0]
-        array.setflags(write=False)  # a change would not reach the table
-        return array
 
     @cached_property
     def hold(self) -> HoldConditions:
