@@ -40,20 +40,48 @@ MIN_GROSS_ERROR = 0.1
 """Share of gravity: if no position is farther off, no unit and no axis can be wrong."""
 
 
+@dataclass(frozen=True)
+class Correction:
+    """A gross error, undone.
+
+    Attributes
+    ----------
+    name : str, of the gross error
+    reason : str, what is wrong, in words; empty if nothing is
+    corrected : Campaign, without the error
+    matrix : (3, 3) array, turns forces as they were read into mended ones; None if it is I
+    changed : (n,) bool array, which positions change; None if all do
+    left_out : tuple of int, positions that cannot be mended
+    """
+
+    name: str
+    reason: str
+    corrected: Campaign
+    matrix: Array | None = None
+    changed: NDArray[np.bool_] | None = None
+    left_out: tuple[int, ...] = ()
+
+
 @dataclass(frozen=True, eq=False)
 class RealSensor:
     """A sensor that is fitted robustly to most positions of a campaign.
 
     Attributes
     ----------
-    campaign : Campaign
+    campaign : Campaign, after the corrections
     attitude : bool, whether to compare with the robot's attitudes, or with gravity alone
     mounted : bool, whether the sensor may be mounted in any attitude, with errors of any size
+    undone : tuple of Correction, what was corrected in the campaign, one after the other
     """
 
     campaign: Campaign
     attitude: bool
     mounted: bool = False
+    undone: tuple[Correction, ...] = ()
+
+    def after(self, correction: Correction) -> RealSensor:
+        """Return the sensor that is fitted to the campaign after one more correction."""
+        return replace(self, campaign=correction.corrected, undone=(*self.undone, correction))
 
     @property
     def gravity(self) -> float:

@@ -7,14 +7,12 @@ a function that yields its corrections.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, replace
 from functools import partial
 from itertools import chain, permutations, product
-from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from accelstudy.basics.errors import InputError
 from accelstudy.basics.units import ROBOT_UNITS, SENSOR_UNITS, STANDARD_GRAVITY, UNITS
@@ -24,6 +22,7 @@ from accelstudy.campaign.gross_errors.real_sensor import (
     MIN_POSITION_ERROR,
     MIN_RATIO,
     Array,
+    Correction,
     RealSensor,
     attitude_forces,
 )
@@ -32,12 +31,12 @@ from accelstudy.leveling.angles import usual_norm
 from accelstudy.sensors.conversion import Conversion, conversion_of
 from accelstudy.sensors.plausibility import LARGEST
 
-SIGNED_PERMUTATIONS = tuple(
-    tuple(sign * axis for sign, axis in zip(signs, axes, strict=True))
-    for axes in permutations((1, 2, 3))
+EXCHANGES = [
+    np.eye(3)[:, axes] * signs
+    for axes in permutations(range(3))
     for signs in product((1, -1), repeat=3)
-)
-"""What the channels x, y, z show: axis 1, 2 or 3 with a sign; the first is the right one."""
+]
+"""All P with f = P f_read, where each channel shows one axis or its negative; the first is I."""
 GROSS_ERRORS = ("axis_error", "outlier_position", "row_order", "unit_error")
 """Names of the gross errors that are recognised."""
 MAX_ERRORS = 4
@@ -57,47 +56,20 @@ MIN_POSITIONS_PER_OUTLIER = 8
 
 
 @dataclass(frozen=True)
-class Correction:
-    """What would undo a gross error.
-
-    Attributes
-    ----------
-    name : str, of the gross error
-    reason : str, what is wrong, in words; empty if nothing is
-    arrays : mapping, arrays of the campaign that change
-    header : mapping, keys of its header that change
-    matrix : (3, 3) array, turns forces as they were read into mended ones; None if it is I
-    changed : (n,) bool array, which positions change; None if all do
-    left_out : tuple of int, positions that cannot be mended
-    """
-
-    name: str
-    reason: str
-    arrays: Mapping[str, Any] = field(default_factory=dict)
-    header: Mapping[str, Any] = field(default_factory=dict)
-    matrix: Array | None = None
-    changed: NDArray[np.bool_] | None = None
-    left_out: tuple[int, ...] = ()
-
-    def apply(self, campaign: Campaign) -> Campaign:
-        """Undo the error in a campaign."""
-        mended = campaign.with_arrays(**self.arrays) if self.arrays else campaign
-        mended = mended.with_header(**self.header) if self.header else mended
-        return mended.without(dict.fromkeys(self.left_out, self.reason))
-
-
-@dataclass(frozen=True)
 class Recognition:
     """Gross errors that were recognised.
 
     Attributes
     ----------
     errors : tuple of Correction, one after the other
-    corrected : Campaign, with the errors undone
     """
 
     errors: tuple[Correction, ...]
-    corrected: Campaign
+
+    @property
+    def corrected(self) -> Campaign:
+        """The campaign without the errors."""
+        return self.errors[-1].corrected
 
     @property
     def names(self) -> tuple[tuple[str, int | None], ...]:
@@ -206,9 +178,7 @@ def check_plausible(campaign: Campaign, where: str, angle_unit: str = "gon") -> 
     doubts = check_size(where, campaign.forces, campaign.gravity, unit, conversion)
     if campaign.angles is None:
         return doubts
-    errors: list[Correction] = []
-    _everywhere(campaign, True, errors, angle_unit)
-    for error in errors:
+    for error in _undo_everywhere(campaign, True, angle_unit).undone:
         if error.name == "unit_error":
             raise InputError(f"{where}: {error.reason}, not in {angle_unit}")
         if error.matrix is not None and np.array_equal(error.matrix, -np.eye(3)):
@@ -239,52 +209,44 @@ def recognise(campaign: Campaign, attitude: bool = True) -> Recognition | None:
     InputError
         If the forces are nowhere near gravity and no unit explains it.
     """
-    errors: list[Correction] = []
-    sensor = _everywhere(campaign, attitude and campaign.angles is not None, errors)
+    sensor = _undo_everywhere(campaign, attitude and campaign.angles is not None)
     # A sensor that is mounted askew is no reason to reorder its positions.
     sensor = sensor.free if sensor.is_askew else sensor
     # A row that was not exchanged may still be wrong by itself.
     for alone in (rows, outliers):
-        sensor = _undo(sensor, errors, alone)
+        sensor = _undo(sensor, alone)
     where, si = f"{campaign.name}: fx, fy, fz", conversion_of("m/s^2")
     check_size(where, sensor.campaign.forces, campaign.gravity, "m/s^2", si)
-    return Recognition(tuple(errors), sensor.campaign) if errors else None
+    return Recognition(sensor.undone) if sensor.undone else None
 
 
-def _everywhere(
-    campaign: Campaign, attitude: bool, errors: list[Correction], angle_unit: str = "gon"
-) -> RealSensor:
-    """Undo a wrong unit and wrong axes, which all positions have, and append them to `errors`."""
+def _undo_everywhere(campaign: Campaign, attitude: bool, angle_unit: str = "gon") -> RealSensor:
+    """Undo a wrong unit and wrong axes, which all positions have."""
     other_units = partial(units, angle_unit=angle_unit)
     # The norm shows a wrong unit even if the axes are wrong, so gravity comes before the attitudes.
-    sensor = _undo(RealSensor(campaign, False), errors, other_units)
+    sensor = _undo(RealSensor(campaign, False), other_units)
     if attitude:
-        return _undo(replace(sensor, attitude=True), errors, axes, other_units)
-    return _undo(sensor, errors, columns_of_counts)
+        return _undo(replace(sensor, attitude=True), axes, other_units)
+    return _undo(sensor, columns_of_counts)
 
 
 def _undo(
-    sensor: RealSensor,
-    errors: list[Correction],
-    *hypotheses: Callable[[RealSensor], Iterator[Correction]],
+    sensor: RealSensor, *hypotheses: Callable[[RealSensor], Iterator[Correction]]
 ) -> RealSensor:
-    """Undo what helps most first, until nothing helps clearly; return the sensor after it."""
+    """Undo what helps most first, until nothing helps clearly."""
     for _ in range(MAX_ERRORS):
-        tried = [
-            (one, replace(sensor, campaign=one.apply(sensor.campaign)))
-            for one in chain.from_iterable(each(sensor) for each in hypotheses)
-        ]
-        helps = [(one, after) for one, after in tried if _is_clear(one, sensor, after)]
+        tried = (sensor.after(one) for one in chain.from_iterable(h(sensor) for h in hypotheses))
+        helps = [after for after in tried if _is_clear(sensor, after)]
         if not helps:
             break
-        least = min(after.misfit for _, after in helps)
-        best, sensor = next(one for one in helps if one[1].misfit <= AS_GOOD * least)
-        errors.append(best)
+        least = min(after.misfit for after in helps)
+        sensor = next(after for after in helps if after.misfit <= AS_GOOD * least)
     return sensor
 
 
-def _is_clear(correction: Correction, before: RealSensor, after: RealSensor) -> bool:
-    """Whether a correction clearly improves what was clearly wrong."""
+def _is_clear(before: RealSensor, after: RealSensor) -> bool:
+    """Whether the last correction clearly improves what was clearly wrong."""
+    correction = after.undone[-1]
     if correction.left_out or (not before.attitude and correction.name == "axis_error"):
         return True  # the hypothesis itself has compared
     if correction.changed is None:
@@ -307,21 +269,20 @@ def axes(sensor: RealSensor) -> Iterator[Correction]:
     ideal = attitude_forces(campaign)
     # An ideal sensor with any bias is near enough to compare all quickly.
     tried, misses = [], []
-    for shown in SIGNED_PERMUTATIONS:
-        for correction in _exchanges(campaign, shown):
-            error = correction.arrays["forces"] - ideal
+    for matrix in EXCHANGES:
+        for correction in filter(None, (_axes(campaign, matrix), _columns(campaign, matrix))):
+            error = correction.corrected.forces - ideal
             bias = np.median(error, axis=0)
             distance = np.linalg.norm(error - bias, axis=1)
             misses.append(float(np.mean(np.minimum(distance, campaign.gravity))))
-            moved = sum(abs(axis) != i for i, axis in enumerate(shown, 1))
-            changes = (moved, sum(axis < 0 for axis in shown), float(np.linalg.norm(bias)))
-            tried.append((changes, correction))
+            moved, turned = np.sum(np.diag(matrix) == 0), np.sum(matrix < 0)
+            tried.append(((moved, turned, np.linalg.norm(bias)), correction))
     near = [
         one for one, miss in zip(tried, misses, strict=True) if miss < MAX_AXIS_RATIO * min(misses)
     ]
     yield from (one for _, one in sorted(near, key=lambda one: one[0]) if one.reason)
-    exchanged = {"angles": campaign.angles[:, ::-1]}
-    yield Correction("axis_error", "roll and pitch of the robot are exchanged", exchanged)
+    reason = "roll and pitch of the robot are exchanged"
+    yield Correction("axis_error", reason, campaign.with_arrays(angles=campaign.angles[:, ::-1]))
 
 
 def columns_of_counts(sensor: RealSensor) -> Iterator[Correction]:
@@ -329,53 +290,49 @@ def columns_of_counts(sensor: RealSensor) -> Iterator[Correction]:
 
     As they were read, no sensor has such biases and scales, though all positions may agree.
     """
-    campaign = sensor.campaign
-    if campaign.header.nominal is None or not sensor.tells or sensor.strangeness <= 1:
+    if not sensor.tells or sensor.strangeness <= 1:
         return
-    corrections = [
-        one
-        for shown in SIGNED_PERMUTATIONS
-        if min(shown) > 0
-        for one in _exchanges(campaign, shown)
-        if one.header
-    ]
-    sensors = (replace(sensor, campaign=one.apply(campaign)) for one in corrections)
-    strangeness = [each.strangeness for each in sensors]
-    if min(strangeness, default=np.inf) <= 1:
-        yield corrections[int(np.argmin(strangeness))]
+    exchanges = (_columns(sensor.campaign, matrix) for matrix in EXCHANGES if np.all(matrix >= 0))
+    sensors = [sensor.after(one) for one in exchanges if one is not None]
+    best = min(sensors, key=lambda one: one.strangeness, default=sensor)
+    if best.strangeness <= 1:
+        yield best.undone[-1]
 
 
-def _exchanges(campaign: Campaign, shown: Sequence[int]) -> Iterator[Correction]:
-    """Undo an exchange of axes, and one of columns of counts, before nominal scales and offsets."""
-    matrix = np.zeros((3, 3))
-    matrix[np.abs(shown) - 1, range(3)] = np.sign(shown)
+def _axes(campaign: Campaign, matrix: Array) -> Correction:
+    """Undo an exchange of axes."""
     reason = _axes_in_words(matrix) if np.any(matrix != np.eye(3)) else ""
-    yield Correction("axis_error", reason, _times(campaign, matrix), matrix=matrix)
-    if campaign.header.nominal is None or not reason:
-        return
+    return Correction("axis_error", reason, _turned(campaign, matrix), matrix)
+
+
+def _columns(campaign: Campaign, matrix: Array) -> Correction | None:
+    """Undo an exchange of columns of counts, if it differs from one of axes."""
+    if campaign.header.nominal is None:
+        return None
     # Counts P r, read with S and o, were r: S (r − o) = S P S⁻¹ · S (P⁻¹ r − P⁻¹ o).
     nominal, log = campaign.header.conversion("forces"), campaign.header.log
     scaled = matrix * nominal.scale[:, None] / nominal.scale
     offset = np.abs(matrix).T @ nominal.offset
     if np.allclose(scaled, matrix) and np.array_equal(offset, nominal.offset):
-        return
+        return None
     if log is not None:
         log = log.model_copy(update={"offset": offset[np.argsort(log.axes.order)].tolist()})
-    header = {"nominal": {"scale": nominal.scale.tolist(), "offset": offset.tolist()}, "log": log}
-    arrays = _times(campaign, scaled, (nominal.offset - offset) * nominal.scale)
-    reason += ", in the counts, before `scale` and `offset`"
-    yield Correction("axis_error", reason, arrays, header, scaled)
+    counts = {"scale": nominal.scale.tolist(), "offset": offset.tolist()}
+    read = campaign.with_header(nominal=counts, log=log)
+    corrected = _turned(read, scaled, (nominal.offset - offset) * nominal.scale)
+    reason = f"{_axes_in_words(matrix)}, in the counts, before `scale` and `offset`"
+    return Correction("axis_error", reason, corrected, scaled)
 
 
-def _times(campaign: Campaign, matrix: Array, shift: Array | float = 0.0) -> dict[str, Array]:
-    """What is read after f → P (f + s), where P takes each axis from one other; sds have no sign.
+def _turned(campaign: Campaign, matrix: Array, shift: Array | float = 0.0) -> Campaign:
+    """Campaign after f → P (f + s), where P takes each axis from one other; sds have no sign.
 
     Columns are reordered, not summed, so no digit changes.
     """
     axes = np.argmax(np.abs(matrix), axis=1)
     factors = matrix[range(3), axes]
-    arrays = {"forces": factors * (campaign.forces + shift)[:, axes]}
-    return arrays if campaign.sd is None else arrays | {"sd": abs(factors) * campaign.sd[:, axes]}
+    sd = None if campaign.sd is None else abs(factors) * campaign.sd[:, axes]
+    return campaign.with_arrays(forces=factors * (campaign.forces + shift)[:, axes], sd=sd)
 
 
 def _axes_in_words(matrix: Array) -> str:
@@ -397,19 +354,23 @@ def units(sensor: RealSensor, angle_unit: str = "gon") -> Iterator[Correction]:
     campaign = sensor.campaign
     norm = usual_norm(campaign.forces) / campaign.gravity
     own = campaign.header.unit if campaign.header.unit in SENSOR_UNITS else "m/s^2"
+    sizes, turns = UNITS["m/s^2"], UNITS["rad"]
     for stated in (own, "g" if own == "m/s^2" else "m/s^2"):
-        for unit, factor in other_units(SENSOR_UNITS, "m/s^2", stated).items():
-            if RIGHT_UNIT < factor * norm < 1 / RIGHT_UNIT:
+        for unit in SENSOR_UNITS:
+            factor = sizes[unit] / sizes[stated]
+            if unit != stated and RIGHT_UNIT < factor * norm < 1 / RIGHT_UNIT:
                 instead = "" if stated == "m/s^2" else f", not in {stated}"
                 matrix = factor * np.eye(3)
                 reason = f"the forces are in {unit}{instead}"
-                yield Correction("unit_error", reason, _times(campaign, matrix), matrix=matrix)
+                yield Correction("unit_error", reason, _turned(campaign, matrix), matrix)
     if sensor.expected is not None:
-        for unit, factor in other_units(ROBOT_UNITS, "rad", angle_unit).items():
-            reason = f"the robot's angles are in {ROBOT_UNITS[unit]}"
-            angles = {"angles": campaign.angles, "yaw": campaign.yaw}
-            arrays = {name: factor * a for name, a in angles.items() if a is not None}
-            yield Correction("unit_error", reason, arrays)
+        for unit, name in ROBOT_UNITS.items():
+            if unit != angle_unit:
+                factor = turns[unit] / turns[angle_unit]
+                angles = {"angles": campaign.angles, "yaw": campaign.yaw}
+                scaled = {k: None if a is None else factor * a for k, a in angles.items()}
+                reason = f"the robot's angles are in {name}"
+                yield Correction("unit_error", reason, campaign.with_arrays(**scaled))
 
 
 def rows(sensor: RealSensor) -> Iterator[Correction]:
@@ -434,8 +395,8 @@ def rows(sensor: RealSensor) -> Iterator[Correction]:
         positions = short_list([*map(str, campaign.positions[moved])])
         reason = f"the forces of positions {positions} are exchanged"
         read = {"forces": campaign.forces, "sd": campaign.sd, "n_samples": campaign.n_samples}
-        arrays = {name: a[order] for name, a in read.items() if a is not None}
-        yield Correction("row_order", reason, arrays, changed=moved)
+        ordered = {name: None if a is None else a[order] for name, a in read.items()}
+        yield Correction("row_order", reason, campaign.with_arrays(**ordered), changed=moved)
 
 
 def outliers(sensor: RealSensor) -> Iterator[Correction]:
@@ -452,10 +413,5 @@ def outliers(sensor: RealSensor) -> Iterator[Correction]:
     reason = f"positions {positions} are wrong by up to {size:.2g} m/s^2"
     if len(bumped) == 1:
         reason = f"position {positions} is wrong by {size:.2g} m/s^2"
-    yield Correction("outlier_position", reason, left_out=bumped)
-
-
-def other_units(units: Iterable[str], quantity: str, stated: str) -> dict[str, float]:
-    """Units that could be meant, each with the factor that mends numbers stated in `stated`."""
-    sizes = UNITS[quantity]
-    return {unit: sizes[unit] / sizes[stated] for unit in units if unit != stated}
+    without = campaign.without(dict.fromkeys(bumped, reason))
+    yield Correction("outlier_position", reason, without, left_out=bumped)
