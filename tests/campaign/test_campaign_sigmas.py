@@ -1,7 +1,6 @@
 """Sigmas that a calibration quotes where its noise is estimated: intervals, and their check."""
 
 import math
-import re
 
 import numpy as np
 import pytest
@@ -79,26 +78,13 @@ def test_a_wrong_noise_does_not_show_in_simulation_and_is_said():
     assert (fooled.sigma < 0.8 * honest.sigma).all()
     table = check_sigmas(fooled, replicates=1000, seed=3)
     assert np.abs(table["ratio"] - 1).max() < 4.5 / math.sqrt(2 * 1000)
-    assert "No noise is stated" in what_a_check_finds(fooled)
     assert "no ratio can show" in what_a_check_finds(fooled)
     assert "the global test tells" in what_a_check_finds(honest)
     refuted = once.with_sigma(1e-4)
-    assert "refute the stated noise" in what_a_check_finds(fit_campaign(refuted, NINE, GRAVITY))
+    assert "has the noise in the residuals" in what_a_check_finds(
+        fit_campaign(refuted, NINE, GRAVITY)
+    )
     few = simulated_campaign({"b_x": 0.1}, scheme="d-optimal-9", noise=Noise(0.002))
     assert "nothing tells" in what_a_check_finds(fit_campaign(few, NINE, GRAVITY))
     with pytest.raises(InputError, match="no sigma to check"):
         check_sigmas(fit_campaign(few.with_sigma(None), NINE, GRAVITY))
-
-
-def test_the_interval_of_the_noise_holds():
-    """Variances of r = 15 residuals, drawn: the interval of the noise holds 95 %."""
-    fit = fit_campaign(simulated_campaign({}).with_sigma(None), NINE, GRAVITY)
-    assert fit.adjustment.redundancy == 15
-    low, high = re.search(
-        r"from ([\d.]+) mm/s\^2 to ([\d.]+) mm/s\^2", what_a_check_finds(fit)
-    ).groups()
-    sigma = 1e3 * fit.sigma_position
-    drawn = np.random.default_rng(6).standard_normal((40_000, 15))
-    estimate = np.sqrt(np.mean(drawn**2, axis=1))  # of a noise of 1
-    share = np.mean((estimate * float(low) < sigma) & (sigma < estimate * float(high)))
-    assert abs(share - 0.95) < 4.5 * math.sqrt(0.05 * 0.95 / 40_000)

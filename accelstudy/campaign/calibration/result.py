@@ -221,7 +221,7 @@ class Calibration(Result):
             positions=worst.head(MAX_ROWS).sort_index().to_dict("records"),
             refuted=REFUTATION_LEVEL,
             figures=drawn,
-            next_steps=wording.next_steps(fit, self.state, self.source, place / HERE),
+            next_steps=wording.next_steps(fit, self.source, place / HERE),
         )
 
     def tell(self, place: Path) -> None:
@@ -235,6 +235,6 @@ class Calibration(Result):
         say(wording.approach_words(fit))
         say(axes_note(None if (log := fit.campaign.header.log) is None else log.frame))
         show(f"{self.state.upper()}: {self.verdict}")
-        steps = wording.next_steps(fit, self.state, self.source, place / HERE)
+        steps = wording.next_steps(fit, self.source, place / HERE)
         say(": ".join(steps[0]))
         say(f"report: {place / 'report.html'}")

@@ -7,7 +7,6 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from scipy import special
 
 from accelstudy.basics import suggestions
 from accelstudy.basics.levels import ACCEPTED, BLIND, IMPLAUSIBLE, REJECTED
@@ -68,27 +67,16 @@ def interval_words(fit: CampaignFit) -> str:
 
 
 def what_a_check_finds(fit: CampaignFit) -> str:
-    """Say what `check_sigmas` can find, and what it cannot.
-
-    The noise of the residuals has the 95 % interval σ̂ √(r/χ²_r), if they are Gaussian noise alone.
-    """
-    r = fit.adjustment.redundancy
-    low, high = (fit.sigma_position * np.sqrt(r / special.chdtri(r, p)) for p in (0.025, 0.975))
-    return render_lines(TEMPLATE, "finds", fit, low, high)[0]
+    """Say what `check_sigmas` can find, and what it cannot."""
+    return render_lines(TEMPLATE, "finds", fit)[0]
 
 
-def next_steps(
-    fit: CampaignFit,
-    state: str,
-    campaign: str | Path,
-    result: str | Path,
-) -> list[tuple[str, str]]:
+def next_steps(fit: CampaignFit, campaign: Path, result: Path) -> list[tuple[str, str]]:
     """Say what to do next, most urgent first.
 
     Parameters
     ----------
     fit : CampaignFit
-    state : str, of the calibration
     campaign : path of the campaign's folder
     result : path of calibration.json
 
@@ -98,7 +86,7 @@ def next_steps(
     """
     chosen = fit.model.name, fit.approach.name, fit.campaign.prior
     diagnose = suggestions.diagnose(campaign, *chosen)
-    if state in (REJECTED, IMPLAUSIBLE):
+    if fit.state in (REJECTED, IMPLAUSIBLE):
         return [("Find what is wrong or missing", diagnose)]
     return [
         ("Level a log with this calibration", suggestions.apply(result)),
