@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import csv
 import io
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
@@ -16,7 +15,7 @@ import yaml
 from numpy.typing import NDArray
 
 from accelstudy.basics.errors import InputError, brief
-from accelstudy.basics.wording import one_line
+from accelstudy.basics.wording import one_line, short_list
 from accelstudy.campaign.columns import COLUMNS, KEYS, Columns, table_of
 from accelstudy.campaign.gross_errors.recognition import check_plausible
 from accelstudy.campaign.header import HEADER, TABLE, Header
@@ -28,9 +27,6 @@ from accelstudy.files.validation import validate
 Array = NDArray[np.float64]
 Table = Mapping[str, Sequence[Any]]
 """The table of positions by name: texts of its file, or numbers that are to be written."""
-
-MOST_NAMED = 5
-"""Largest number of unknown columns with a warning each."""
 
 
 def read_campaign(folder: str | Path, *, plausible: bool = True, running: bool = False) -> Campaign:
@@ -77,30 +73,19 @@ def read_campaign(folder: str | Path, *, plausible: bool = True, running: bool =
         campaign = Campaign(header, table_of({"forces": np.zeros((0, 3)), "angles": angles}))
     else:
         campaign = _parse(columns, header, path, plausible)
-        warnings = [*_ignored_in(columns, path), *warnings]
+        if unknown := [name for name in columns if name not in KEYS]:
+            hints = dict.fromkeys(_hint(name, KEYS) for name in unknown)
+            said = f"{path}: not known and ignored: {short_list(unknown)}{''.join(hints)}"
+            warnings = [said, *warnings]
     return replace(campaign, warnings=tuple(warnings))
 
 
 def _text_of(path: Path) -> str:
     """Text of a table."""
-    if not path.exists() and path.with_suffix(".parquet").exists():
-        raise InputError(f"{path}: no such file; save {path.stem}.parquet as CSV")
     try:
         return read_text(path)
     except UnicodeDecodeError as error:
         raise InputError(f"{path}: not a CSV file in UTF-8 ({error.reason})") from None
-
-
-def _ignored_in(columns: Table, path: Path) -> list[str]:
-    """Warnings about columns that the format does not know."""
-    unknown = [name for name in columns if name not in KEYS]
-    said = [
-        f"{path}: column {brief(name)} is not known and ignored{_hint(name, KEYS)}"
-        for name in unknown[:MOST_NAMED]
-    ]
-    if more := len(unknown) - len(said):
-        said.append(f"{path}: {more} more columns are not known and ignored")
-    return said
 
 
 def _hint(name: str, known: Sequence[str]) -> str:
@@ -113,22 +98,22 @@ def _hint(name: str, known: Sequence[str]) -> str:
 def _columns_of(text: str, path: Path) -> Table:
     """Columns of the text of a CSV table; errors name `path`."""
     try:
-        reader = csv.reader(io.StringIO(text, newline=""), skipinitialspace=True, strict=True)
-        lines = [(reader.line_num, row) for row in reader if any(map(str.strip, row))]
-    except csv.Error as error:
+        rows = pd.read_csv(
+            io.StringIO(text), header=None, dtype=str, na_filter=False, skipinitialspace=True
+        )
+    except pd.errors.EmptyDataError:
+        raise InputError(
+            f"{path}: empty; expected a line of column names, position, fx, fy, fz …"
+        ) from None
+    except pd.errors.ParserError as error:
         raise InputError(f"{path}: not a whole CSV file ({one_line(error)})") from None
-    if not lines:
-        raise InputError(f"{path}: empty; expected a line of column names, position, fx, fy, fz …")
-    names = [name.strip() for name in lines[0][1]]
+    names = [name.strip() for name in rows.iloc[0]]
     if len(names) == 1:
         raise InputError(f"{path}: one column, {brief(names[0])}; expected columns between commas")
-    for line, row in lines[1:]:
-        if len(row) != len(names):
-            raise InputError(f"{path}: line {line}: {len(row)} values for {len(names)} columns")
     for name in names:
         if names.count(name) > 1:
             raise InputError(f"{path}: {name!r}: the column stands twice")
-    return {name: [row[i] for _, row in lines[1:]] for i, name in enumerate(names)}
+    return {name: rows[i][1:].tolist() for i, name in enumerate(names)}
 
 
 def write_campaign(campaign: Campaign, folder: str | Path, plausible: bool = True) -> None:
