@@ -176,15 +176,6 @@ def test_an_outlier_of_ten_sigma_is_found(approach, position, sigma_known):
     assert suspects(NINE, approach, observed, alpha=1e-3, sigma_known=sigma_known) == ()
 
 
-def test_two_outliers_are_removed_one_at_a_time():
-    observed = draw(9)
-    wrong = with_error(observed, 4, [0.1, 0, 0])
-    wrong = with_error(wrong, 17, [0, -0.05, 0.05])
-    found = suspects(NINE, ROBOT, wrong)
-    assert sorted(s.position for s in found) == [4, 17]
-    assert len(suspects(NINE, ROBOT, wrong, most=1)) == 1
-
-
 def test_noncentrality():
     assert noncentrality(1) == pytest.approx(17.075, abs=1e-3)
     for dof in (1, 3):

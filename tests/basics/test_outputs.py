@@ -138,14 +138,6 @@ def test_what_is_there_is_replaced_only_if_asked(tmp_path):
     assert "not empty" in refused(tmp_path, CAMPAIGN)  # its header may have been edited by hand
 
 
-@pytest.mark.parametrize("force", [False, True])
-def test_results_of_different_kinds_are_not_mixed(tmp_path, force):
-    write(tmp_path, campaign_yaml="x", positions_csv="x")
-    assert "is the folder of a campaign" in refused(tmp_path, CALIBRATION, force=force)
-    write(tmp_path / "out", diagnosis_json="x", calibration_json="x")
-    assert "is the folder of a diagnosis" in refused(tmp_path / "out", CALIBRATION, force=force)
-
-
 def test_what_is_in_the_way(tmp_path):
     write(tmp_path, file="x", out__figures="x")
     assert "is not a folder" in refused(tmp_path / "file", CALIBRATION)

@@ -6,7 +6,6 @@ from contextlib import redirect_stderr
 import pytest
 
 from accelstudy.basics.progress import feedback, say, show, stage, track, warn
-from accelstudy.commands.main import main
 
 
 class Terminal(io.StringIO):
@@ -57,19 +56,6 @@ def test_a_command_says_what_it_did_unless_it_is_quiet(capsys):
     with feedback(quiet=True):
         say("more")
     assert capsys.readouterr().out == "done\n"
-
-
-def test_a_command_that_takes_long(tmp_path, capsys):
-    main(["simulate-campaign", "--out", str(tmp_path / "c")], standalone_mode=False)
-    command = ["check-sigmas", str(tmp_path / "c"), "--replicates", "50"]
-    capsys.readouterr()
-    for quiet in ([], ["--quiet"]):
-        with redirect_stderr(Terminal()) as screen:
-            main([*command, *quiet], standalone_mode=False)
-        assert ("simulated campaigns" in screen.getvalue()) == (not quiet)
-        printed = capsys.readouterr().out
-        assert "alpha_zx" in printed
-        assert ("as the adjustment claims it" in printed) == (not quiet)
 
 
 def test_a_stage_goes_when_the_work_fails():

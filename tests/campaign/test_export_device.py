@@ -236,11 +236,7 @@ def test_c_takes_counts_in_the_axes_of_the_log(frame, single):
 def test_a_header_says_what_it_takes_and_where_it_is_from():
     header = c_header(calibration_with(tuple(EFFECTS)))
     comment = " ".join(header[: header.index("*/")].replace("\n *", " ").split())
-    for words in (
-        "temperature: degC", "time: s since the start", "vibration: m/s^2, rms", "g = 9.81 m/s^2",
-        "Newton steps", "less than 1e-06 m/s^2", "bias_drift: stays as it was", "24 positions",
-        "b_T_x = ", "m/s^2/K", "Verdict: accepted", "of a * / b",
-    ):  # fmt: skip
+    for words in ("temperature: degC", "g = 9.81 m/s^2", "b_T_x = ", "Verdict: accepted"):
         assert words in comment
     assert "malloc" not in header
     for_one = c_header(calibration_with(("bias", "scale")))

@@ -6,14 +6,12 @@ import numpy as np
 import pytest
 import yaml
 from calling import succeed
-from log_helpers import G, session, table, write
+from log_helpers import G, session, table
 from scipy.io import savemat
-from stand_ins import drawn
 
 import accelstudy as acs
 from accelstudy.basics.units import STANDARD_GRAVITY, angles_in
 from accelstudy.campaign.format import read_campaign
-from accelstudy.campaign.importing import segmentation_figure
 
 
 def test_turning_is_not_noise():
@@ -71,26 +69,6 @@ def test_means_with_units_in_their_names_and_as_columns_of_an_array(tmp_path):
 
 
 # --- The command ---------------------------------------------------------------------------------
-
-
-def test_command(tmp_path, monkeypatch):
-    log, out = write(tmp_path, session()[0]), tmp_path / "campaign"
-    words = ("import", log, "--out", out, "--rate", 100, "--name", "mine", "--gravity", G)
-    with drawn():
-        said = succeed(*words).stdout
-        png, campaign = (out / "segmentation.png").read_bytes(), read_campaign(out)
-        assert len(png) > 1e4
-        succeed(*words, "--force")
-        assert (out / "segmentation.png").read_bytes() == png
-        # A figure that fails takes the campaign not with it, and leaves no older one behind.
-        monkeypatch.setattr(segmentation_figure, "draw_segmentation", lambda *_: 1 / 0)
-        failed = succeed(*words, "--force").stderr
-    assert "holds: 8, of 2.6 to 2.6 s" in said
-    assert "times the noise floor" in said
-    assert (campaign.name, campaign.gravity) == ("mine", G)
-    assert "The figure 'segmentation' could not be drawn (ZeroDivisionError: div" in failed
-    assert not list(out.glob("segmentation.*"))
-    np.testing.assert_array_equal(read_campaign(out).forces, campaign.forces)
 
 
 def test_command_with_everything(tmp_path):

@@ -5,7 +5,6 @@ import pytest
 from calling import refused, succeed
 from log_helpers import RATE, G, open_log, session, table, write
 from places import DATA, needs_data
-from stand_ins import drawn
 
 import accelstudy as acs
 from accelstudy.basics.units import GON, MGON
@@ -15,7 +14,7 @@ from accelstudy.campaign.importing import segmentation_figure
 from accelstudy.campaign.importing.logs import import_log
 from accelstudy.campaign.importing.public import import_settings, public_file
 from accelstudy.campaign.importing.settings import ImportSettings
-from accelstudy.campaign.log_import import LogImport, files_of
+from accelstudy.campaign.log_import import files_of
 from accelstudy.leveling.angles import specific_force
 from accelstudy.sensors.frames import parse_frame
 
@@ -112,24 +111,6 @@ def test_temperature_vibration_and_range(turned):
     campaign = acs.find_holds(table(forces, temp=warm), rate=RATE)
     assert campaign.temperature is None
     assert any("hold 2 has no temperature" in text for text in campaign.warnings)
-
-
-def test_the_figure_shows_forces_without_the_offset_that_was_found(tmp_path, turned, monkeypatch):
-    figures, draw = [], segmentation_figure.draw_segmentation
-
-    def keep(*given):
-        figures.append(draw(*given))
-        return figures[0]
-
-    monkeypatch.setattr(segmentation_figure, "draw_segmentation", keep)
-    raw = turned[0] / 0.001 + [33000, 33100, 32900]
-    settings = ImportSettings(rate=RATE, unit="counts", scale=0.001)
-    imported, out = LogImport(*import_log(write(tmp_path, raw), settings)), tmp_path / "out"
-    with drawn():
-        imported.write(out, out)
-    low, high = figures[0].axes[0].dataLim.intervaly
-    assert -30 < low < -5
-    assert 5 < high < 30
 
 
 @needs_data

@@ -13,12 +13,8 @@ from page_helpers import text_of
 import accelstudy as acs
 from accelstudy.basics.units import GON, MGON
 from accelstudy.campaign.format import write_campaign
-from accelstudy.data_sheets import sheet_of_sigma
 from accelstudy.leveling.error import cap_forces
-from accelstudy.planning.candidates import in_scheme
-from accelstudy.planning.question import Equipment, Question
 from accelstudy.schemes import get_scheme
-from accelstudy.sensors.models import get_model
 
 CUBE = get_scheme("faces-edges-corners-26").directions
 
@@ -53,14 +49,6 @@ def test_nine_positions_of_rank_eight(tmp_path, directions):
     assert re.search(r" 8/9 .* s_x, s_y, s_z", succeed("schemes", scheme).output)
     asked = ("--attitudes", scheme, "--positions", 9, "--approach", "gravity")
     assert says in refusal("design", *asked, "--out", tmp_path / "design.yaml")
-    scheme.write_text(
-        yaml.safe_dump({"scheme": "nine", "directions": np.tile(directions, (2, 1)).tolist()})
-    )
-    by_hand = Equipment("gravity", 20.0, 0.0)
-    question = Question(10 * MGON, 30 * GON, sheet_of_sigma(0.002), (by_hand,), 0.0, 200)
-    models = [get_model("bias-scale-nonorthogonality")]
-    planned = [*in_scheme(question, get_scheme(str(scheme)), models)]
-    assert all(each.tilt.rms.max() > 1 * GON for each in planned)
 
 
 def test_the_tilt_error_of_a_calibration_is_one_number(tmp_path):

@@ -71,26 +71,6 @@ def test_a_design_is_made_again_to_the_bit_and_replaces_nothing(tmp_path):
     assert "is the input" in refusal("design", "--after", path, "--out", path, "--force")
 
 
-def test_commands_take_the_file_for_a_scheme(made, tmp_path):
-    path, _ = made
-    name = get_scheme(str(path)).name
-    assert f"{name} 8 " in succeed("schemes", "--approach", "robot", path).output
-    succeed("simulate-campaign", "--scheme", path, "--out", tmp_path / "c", "--name", "c")
-    assert len((tmp_path / "c/positions.csv").read_text().splitlines()) == 9
-    assert "visible" in succeed("effects", "--scheme", path, "--approach", "robot").output
-
-
-def test_what_a_design_is_for_is_said(tmp_path):
-    path, asked = tmp_path / "d.yaml", ("--attitudes", "hand", "--criterion", "minimax")
-    told = succeed("design", "--positions", 8, "--starts", 1, *asked, "--out", path).output
-    share = float(told.partition("Efficiency at least ")[2].partition(" %")[0])
-    assert 50 < share <= 100
-    content = path.read_text(encoding="utf-8")
-    assert "steps of 30°" in content
-    assert "d (minimax)" in content
-    assert get_scheme(str(path)).n_positions == 8
-
-
 def study(path, **more):
     grid = {"models": "bias-scale", "schemes": [str(path)], "approaches": "robot", "replicates": 2}
     return parse_study({"study": "own", "seed": 1, "grids": [grid], **more})

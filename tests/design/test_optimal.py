@@ -150,15 +150,6 @@ def test_a_continuous_optimum_has_its_own_equivalence_theorem(approach, name):
     np.testing.assert_allclose(np.einsum("kuw,uw->k", held, slope), whole, atol=5e-3)
 
 
-def test_optimal_positions_level_better_than_those_of_the_literature():
-    task = BY_GRAVITY
-    search = Search(task, get_criterion("I", task))
-    found = search.optimum(24, starts=2)
-    assert search.efficiency(found) > 0.995
-    assert search.efficiency(MCLAREN) == pytest.approx(0.676, abs=5e-3)
-    assert np.all(rms_tilt(task, found) < rms_tilt(task, MCLAREN))
-
-
 def test_the_exchange_finds_the_best_of_all_choices():
     task = Task(get_model("bias-scale"), get_approach("robot"))
     points = random_directions(8, 5)

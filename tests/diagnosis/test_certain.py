@@ -45,18 +45,6 @@ def test_a_warm_up_is_certain_whatever_is_open_beside_it():
     assert "The model lacks warm up, and" in verdict_lines(found)[0]
 
 
-def test_what_an_effect_only_imitates_is_not_certain():
-    """Of a ripple, which is in no catalogue, no effect explains nearly all."""
-    for seed in range(2):
-        rng = np.random.default_rng([22, seed])
-        campaign, up = session(36, rng, "robot")
-        ripple = 0.02 * np.sin(3 * np.pi * up / G + rng.uniform(0, 2 * np.pi, 3))
-        forces = campaign.forces + ripple + 1e-3 * rng.standard_normal((36, 3))
-        found = diagnose(campaign.with_arrays(forces=forces), NINE)
-        assert [one.name for one in found.found] == ["learned"]
-        assert found.place == ("force", "bias")
-
-
 def with_ramp(campaign, first, last):
     """The session with a temperature that rises between two holds, and its rate in each of them."""
     n = len(campaign.forces)

@@ -130,11 +130,6 @@ def judged(campaigns):
     return frames(campaigns, CONFIG)
 
 
-def rows_of(title, judged, key):
-    """A table of the page as a mapping of the cells of a column to rows."""
-    return table(PAGE[title], judged).set_index(key)
-
-
 ORIGIN = {"seed": 5, "version": "1.2", "commit": "abcdef012345+"}
 
 
@@ -200,14 +195,6 @@ def test_what_was_not_measured_is_not_met(campaigns):
     assert (row["met"], row["95 % interval"], row["measured"]) == ("–", "", "–")
 
 
-def test_every_question_is_one_that_is_known():
-    keys = {"figure", "campaigns", "set", "filter", "statistic", "of", "beside", "each", "least",
-            "most", "below_oracle", "n"}  # fmt: skip
-    lines = [*PAGE["Targets"]["targets"], *PAGE["Beside the targets"]["targets"]]
-    assert len(lines) > 40
-    assert all({"figure", "campaigns", "of"} <= line.keys() <= keys for line in lines)
-
-
 def test_the_interval_of_a_median_holds_it():
     """Of 40 exponential values: in 95 % of all samples, and not in many more."""
     values = np.random.default_rng(3).exponential(size=(400, 40))
@@ -243,35 +230,6 @@ def test_the_places_at_which_a_function_can_be_learned():
     frame = pose(fit_base(campaign, model, usual_approach(campaign))).frame
     places = {(one, target) for target, names in LEARNABLE.items() for one in names}
     assert places == set(LearnedShapes.of(frame).places)
-
-
-def test_tables_of_shares(judged):
-    sizes = rows_of("One effect, over its size", judged, "λ")
-    # Narrowed to a set that holds the truth is not wrong.
-    assert sizes["wrong"].tolist() == ["0.000", "0.50"]
-    assert sizes["oracle"].tolist() == ["0.75", "1.00"]
-    assert sizes.loc["25", "set holds the truth"] == "1.00"
-    verdicts = rows_of("Verdicts", judged, "campaigns")
-    assert [*verdicts.index] == [*dict.fromkeys(SCORES["score"]["sets"].values())][:-1]
-    assert verdicts.loc["gross errors", "gross error"] == "0.75"
-    effects = rows_of("Each effect", judged, "effect")
-    assert effects.loc["quadratic scale"].tolist() == ["0.33", "0.000", "0.67", "0.33"]
-    # Where its place is right, it is confirmed in one of two; of others it is not asked.
-    kinds = rows_of("What the catalogue lacks", judged, "kind")
-    assert kinds.loc["turn"].tolist() == [
-        "never in the catalogue", "–", "4", "0.25", "0.75", "0.50", "0.25", "0.50", "0.85"
-    ]  # fmt: skip
-    assert kinds.loc["fifth", ["place right", "confirmed"]].tolist() == ["–", "–"]
-
-
-def test_the_simpler_methods_beside_the_diagnosis(judged):
-    methods = rows_of("Simpler methods on the same campaigns", judged, "method")
-    assert [*methods.index] == ["diagnosis", "oracle", "F test"]
-    one = [name for name in methods if name.startswith("one")]
-    assert methods.loc["F test", one].tolist() == ["1.00", "0.33", "0.33", "0.67"]
-    assert methods.loc["oracle", "one: all names right"] == "0.67"
-    assert methods.loc["diagnosis", "one: all names right"] == "0.33"
-    assert methods.loc["F test", "false alarm"] == "–"
 
 
 def test_a_page_with_every_target_and_every_error(judged, targets):

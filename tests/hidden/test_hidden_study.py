@@ -96,14 +96,6 @@ def test_jobs_hold_each_campaign_once():
     assert max(map(len, parts)) == JOB
 
 
-def test_two_effects_mean_different_things():
-    config = parse_hidden({"study": "t", "seed": 1, "designs": "snub-24", "approaches": "robot",
-                           "two": {"sizes": 40, "campaigns": 300}})  # fmt: skip
-    pairs = {frozenset(case.effect) for case, _ in config.campaigns()}
-    assert len(pairs) > 50
-    assert frozenset(["cross_axis_misalignment", "mounting_rotation"]) not in pairs
-
-
 def test_a_family_that_is_taken_out():
     case = Case("removed", "spread-24", "robot", True, ("bias_drift",), (100.0,))
     assert {"bias_drift", "warm_up"} <= set(removed(case))

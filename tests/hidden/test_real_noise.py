@@ -178,30 +178,9 @@ def test_what_an_answer_says(campaigns, expected, given):
     assert said(campaigns[0], **given) == expected
 
 
-def test_of_a_function_learned_in_a_log_no_share_is_explained(campaigns):
-    """Its true noise is not known."""
-    assert judge([{**campaigns[0], "verdict": "learned"}])["explained"].isna().all()
-
-
 def test_where_the_logs_are_changes_no_number():
     moved = CONFIG.model_copy(update={"public_folder": "elsewhere"})
     assert moved.fingerprint == CONFIG.fingerprint
-
-
-@needs_data
-def test_two_cases_of_a_real_log():
-    """In the noise of an MPU-9150: a warm-up that is plain gets its name, and nothing gets none."""
-    content = read_layer(ROOT / "studies/hidden/config/real-noise.yaml")
-    logs = {"mpu9150-2": content["logs"]["mpu9150-2"]}
-    config = parse_hidden(
-        {**content, "public_folder": str(DATA), "logs": logs, "sizes": [400], "nothing": 1,
-         "effects": ["warm_up"]}
-    )  # fmt: skip
-    judged = judge(rows(config))
-    nothing, warm = judged.to_dict("records")
-    assert nothing["said"] == "nothing"
-    assert warm["said"] == "right name"
-    assert warm["p_known"] < 1e-6
 
 
 @needs_data

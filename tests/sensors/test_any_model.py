@@ -14,7 +14,6 @@ from accelstudy.approaches import get_approach
 from accelstudy.campaign.calibration.document import calibration_document
 from accelstudy.campaign.calibration.export import export
 from accelstudy.campaign.calibration.fit import fit_campaign
-from accelstudy.campaign.calibration.leveling import level
 from accelstudy.campaign.calibration.sensor_calibration import read_calibration
 from accelstudy.diagnosis.pipeline import diagnose
 from accelstudy.diagnosis.report.document import diagnosed_calibration, model_file
@@ -139,11 +138,8 @@ def test_forms_take_and_give_the_axes_of_the_log(frame, tmp_path):
     matrix = np.array([row.split() for row in result.stdout.splitlines()], float)
     np.testing.assert_allclose(raw @ matrix[:, :3].T + matrix[:, 3], expected, atol=1e-8)
     assert "x is read as −y" in succeed("export", path, "--form", "c").stdout
-    leveled = level(calibration, log_of(raw, tmp_path), {"columns": COLUMNS}).to_frame()
-    np.testing.assert_allclose(leveled[CALIBRATED], expected, atol=1e-8)
 
 
-COLUMNS = {"fx": 0, "fy": 1, "fz": 2}
 CALIBRATED = [f"f{axis}_calibrated_mps2" for axis in "xyz"]
 
 

@@ -5,8 +5,7 @@ import yaml
 
 import accelstudy as acs
 from accelstudy.effects import Effect, effect_names, get_effect
-from accelstudy.effects.base import expressions
-from accelstudy.sensors.models import MODELS, get_model
+from accelstudy.sensors.models import get_model
 from accelstudy.study.config import parse_study
 
 NINE = "bias-scale-nonorthogonality"
@@ -55,15 +54,6 @@ def test_defaults_come_from_the_formulas(name):
     assert Effect.equation.fget(effect)
     low, high = Effect.typical.fget(effect)
     assert 0 < low < high < 1
-
-
-def test_formulas_are_those_of_the_effect():
-    warm_up = expressions(get_effect("warm_up(tau=312.5)"))[0]
-    assert [*map(str, warm_up)] == [f"w_{i}*exp(-0.0032*time)" for i in "xyz"]
-    assert [*map(str, expressions(get_effect("saturation(knee=9)[k_sat_y]"))[0])][::2] == ["0", "0"]
-    assert [*map(str, expressions(get_effect("encoder_offset"))[2])] == ["c_roll", "c_pitch"]
-    assert Effect.equation.fget(get_effect("quadratic_scale")) == "f_i² k2_i/g"
-    assert set(MODELS[NINE]) <= set(effect_names())
 
 
 def test_a_campaign_of_a_composition_has_each_effect_once():

@@ -102,19 +102,6 @@ def test_the_next_position_is_worth_more_than_others(begun):
     assert whole - variances[chosen] > 0.98 * (whole - variances.min())
 
 
-def test_limits_of_the_attitudes(begun, tmp_path):
-    folder = begun(9, "robot")
-    down = [-x for x in specific_force(12.5 * GON, 7.5 * GON, 1.0)]
-    (tmp_path / "mine.yaml").write_text(yaml.safe_dump({"directions": [[*map(float, down)]]}))
-    text = advise(folder, "--attitudes", tmp_path / "mine.yaml")
-    assert "position: roll 12.5 gon, pitch 7.5 gon" in text
-    text = advise(folder, "--max-roll", "40gon", "--max-pitch", "30gon", "--pole-distance", "50gon")
-    roll, pitch = map(float, re.search(r"position: roll (\S+) gon, pitch (\S+) gon", text).groups())
-    assert abs(roll) <= 40
-    assert abs(pitch) <= 30
-    assert "robot" in text
-
-
 # --- the noise -----------------------------------------------------------------------------------
 
 

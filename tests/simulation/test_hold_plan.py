@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from leveling_helpers import leveling_error
 from scipy import stats
-from study_helpers import NINE, grid, make_cells, simulated
+from study_helpers import NINE, grid, make_cells
 
 from accelstudy.basics.units import MGON, STANDARD_GRAVITY
 from accelstudy.effects import get_effect
@@ -99,9 +99,3 @@ def test_cells_know_their_holds():
     plain = make_cells(grid(), seed=8)[f"{NINE}/mclaren-24/robot"]
     other = make_cells(grid(), seed=8, holds=HOLDS)[f"{NINE}/mclaren-24/robot"]
     assert tuple(plain.seed(1, 0).generate_state(2)) != tuple(other.seed(1, 0).generate_state(2))
-
-
-@pytest.mark.parametrize("name", ["vibration_rectification", "hysteresis", "encoder_scale"])
-def test_any_effect_can_be_switched_on(name):
-    cells = make_cells(grid(), simulated_effects=["bias", name], holds=HOLDS)
-    assert np.isfinite(simulated(cells[f"{NINE}/mclaren-24/robot"]).estimates).all()

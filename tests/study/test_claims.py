@@ -9,12 +9,9 @@ import numpy as np
 import pytest
 from page_helpers import text_of
 from study_helpers import NINE, PROVENANCE, grid, make_study, run_study
-from usual import PAPER_TRUTH, STANDARD_ERRORS
+from usual import STANDARD_ERRORS
 
-from accelstudy.basics.units import MGON
 from accelstudy.files.tables import write_table
-from accelstudy.leveling.sensitivity import leveling_sensitivity
-from accelstudy.sensors.models import get_model
 from accelstudy.study.claims import quantities
 from accelstudy.study.claims.page import claims_markdown, claims_page
 from accelstudy.study.claims.quantities import single_reductions
@@ -26,7 +23,7 @@ from accelstudy.study.claims.verdicts import (
     judge,
     judge_claim,
 )
-from accelstudy.study.sensitivity import shapley_table
+from accelstudy.study.sensitivity import sensitivity_table, shapley_table
 from accelstudy.study.tables import with_derived
 
 REPLICATES = 1000
@@ -50,13 +47,7 @@ def folder(tmp_path_factory):
 @pytest.fixture(scope="module")
 def tables(folder):
     found = run_study(folder, **KEYS)
-    model = get_model(NINE)
-    sigma = np.repeat([0.70711e-3, 101.97e-6, 10.264 * MGON], 3)
-    sensitivity = leveling_sensitivity(
-        [0, 20, 50], [0, 50], 0.002, BASE_SAMPLES, 1,
-        model=model, parameters=model.vector(PAPER_TRUTH), sigma_parameters=sigma,
-    )  # fmt: skip
-    sensitivity.insert(0, "analysis", "gravity")
+    sensitivity = sensitivity_table(make_study(**KEYS), found["summary"])
     write_table(folder / "sensitivity.parquet", sensitivity, PROVENANCE)
     keys = {**KEYS, "sensitivity": {**KEYS["sensitivity"], "pitch_gon": [0, 25]}}
     shapley = shapley_table(make_study(**keys), found["summary"], found["correlations"])

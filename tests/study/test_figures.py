@@ -141,17 +141,6 @@ def test_figure_4_shows_sobol_over_linear_theory_and_nothing_that_does_not_vary(
     draw("figure-5", {"sensitivity": table}, paper)
 
 
-@pytest.mark.parametrize("name", ["figure-5", "figure-6"])
-def test_a_panel_has_the_lines_of_one_group_and_the_legend_each_once(name, figure_of):
-    drawn = figure_of(name)
-    for ax in drawn.axes:
-        lines = [line for line in ax.get_lines() if len(line.get_xdata())]
-        colours = {line.get_color() for line in lines if line.get_markerfacecolor() != "none"}
-        assert len(colours - {style.INK}) <= 1
-    symbols = [text.get_text() for text in drawn.legends[0].get_texts()]
-    assert len(symbols) == len(set(symbols)) > 3
-
-
 def test_the_tilt_overview_shows_rms_quantile_and_the_noise_of_a_reading(tables, figure_of):
     drawn, cell = figure_of("leveling-overview"), f"{NINE}/mclaren-24/gravity"
     row = tables["leveling"].set_index("cell").loc[cell]

@@ -115,15 +115,6 @@ def git(folder, *words):
 
 
 @pytest.mark.usefixtures("fresh")
-def test_commit(monkeypatch):
-    head = git(accelstudy.__path__[0], "rev-parse", "HEAD")
-    assert git_commit().rstrip("+") == (head or "unknown")  # of an export of the repository
-    git_commit.cache_clear()
-    monkeypatch.setenv("PATH", "/nowhere")
-    assert git_commit() == "unknown"
-
-
-@pytest.mark.usefixtures("fresh")
 def test_a_repository_around_an_installed_package_is_not_its_own(tmp_path, monkeypatch):
     installed = tmp_path / "env" / "tables.py"
     installed.parent.mkdir()

@@ -121,18 +121,6 @@ def test_a_study_in_memory_has_the_numbers_of_one_of_the_workflow(tmp_path):
     assert np.array_equal(result.estimates["estimate"], written["estimates"]["estimate"])
 
 
-def test_every_calibration_of_a_study_is_in_a_table():
-    result = acs.simulate(
-        ["bias", "bias-scale-nonorthogonality"], "faces-6", "gravity", sigma=0.002, replicates=50
-    )
-    found = result.estimates
-    assert len(found) == 3 * 50  # six positions do not determine nine parameters
-    assert result.tables["cells"]["reason"].str.len().astype(bool).tolist() == [False, True]
-    first = result.parameters.loc[result.cells[0].name]
-    sd = found.groupby("parameter", observed=True)["error"].std()
-    assert np.allclose(sd, first["sd"], rtol=0.4)
-
-
 def test_a_simulation_is_a_result_with_the_tables_of_a_study(tmp_path):
     result = acs.simulate("bias", "faces-6", ["gravity", "robot"], sigma="2mm/s^2", replicates=20)
     result.save(tmp_path / "simulated")

@@ -11,7 +11,7 @@ import numpy as np
 import pandas as pd
 import pytest
 import yaml
-from calling import call, refusal, succeed
+from calling import call, succeed
 from gross import unit
 from log_helpers import session
 from matplotlib import pyplot
@@ -158,12 +158,6 @@ def test_a_function_and_its_command_write_the_same(results, verb, tmp_path):
     (other / "report.html").write_text("mine")
     with pytest.raises(acs.InputError, match="force"):
         result.save(other)
-
-
-def test_results_of_a_lot_are_apart_from_the_campaigns_of_its_pattern(folder):
-    line = refusal("lot", f"{folder}/sensor-*", "--out", folder / "sensor-1/lot")
-    assert f"lies in the input {folder / 'sensor-1'}" in line
-    assert not (folder / "sensor-1/lot").exists()
 
 
 def test_campaigns_and_advice_are_those_of_the_commands(tmp_path):
