@@ -52,13 +52,6 @@ def test_the_catalogue_shows_it_and_whose_it_is():
     assert text.count("plugin: ") == text.count("plugin: ripple.py") == 1
 
 
-def test_what_a_page_suggests_names_it_too():
-    hidden = ("--effect", "ripple: 0.006, -0.004, 0.005")
-    succeed("simulate-campaign", "--plugin", "ripple.py", "--out", "mine", *hidden)
-    result = succeed("calibrate", "mine", "--model", "bias-scale+ripple", "--out", "new")
-    assert " --plugin ripple.py\n" in result.stdout
-
-
 def test_the_help_loads_none():
     Path("bad.py").write_text("x = (")
     assert call("effects", "--plugin", "bad.py", "--help").exit_code == 0
@@ -188,18 +181,10 @@ def test_jobs_depend_on_the_content_of_a_package(package):
     assert code_version() != before
 
 
-@pytest.mark.parametrize(("content", "reason"), [
-    ("x = (", "SyntaxError: '(' was never closed (ripple.py, line 1)"),
-    ("x = 1", "registers nothing"),
-    (None, "No module named 'our_sensors.ripple'"),
-])  # fmt: skip
-def test_a_bad_package_is_one_line(package, content, reason):
-    (package / "ripple.py").unlink()
-    if content is not None:
-        (package / "ripple.py").write_text(content)
+def test_a_bad_package_is_one_line(package):
+    (package / "ripple.py").write_text("x = 1")
     line = refusal("effects")
-    assert line.startswith("error: our-sensors 1.0 (our_sensors.ripple): ")
-    assert reason in line
+    assert line.startswith("error: our-sensors 1.0 (our_sensors.ripple): registers nothing")
 
 
 def test_a_bad_data_sheet_of_a_package_is_one_line(package):

@@ -315,9 +315,6 @@ def test_parquet_keeps_its_types(plain, tmp_path):
     level_log(plain, tmp_path / "log.parquet", tmp_path / "out.parquet")
     assert pq.read_table(tmp_path / "out.parquet").select(log.column_names).equals(log)
     level_log(plain, tmp_path / "log.parquet", tmp_path / "out.csv")
-    given = {"columns": {"fx": "when", "fy": "fy", "fz": "fz"}}
-    with pytest.raises(InputError, match="fx and time name the same column"):
-        level_log(plain, tmp_path / "log.parquet", tmp_path / "no.csv", given)
     text = (tmp_path / "out.csv").read_text(encoding="utf-8").splitlines()
     assert text[1].startswith("1,1.5,9,1,1970-01-01 00:00:00.000000000,")
     assert text[2].startswith("2,2.5,9.5,,1970-01-01 00:00:00.000000001,")

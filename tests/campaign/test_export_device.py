@@ -35,10 +35,10 @@ EFFECTS = [
     name for name in effect_names() if get_effect(name).part == "sensor" and name not in BEFORE
 ]
 LAST = "saturation"
-PAIRS = [*((name, LAST) for name in EFFECTS if name != LAST), tuple(EFFECTS)]
-"""Each effect before one that acts last, and all at once."""
-ALONE = [
-    *((name,) for name in EFFECTS),
+ALL = tuple(EFFECTS)
+SOME = [
+    *((name, LAST) for name in EFFECTS if name != LAST),
+    ALL,
     ("thermal_bias(tau=300)",),
     ("learned(coordinate=temperature, low=10, high=40, length=1.5, amplitude=0.1)",),
     ("learned(coordinate=force, low=-15, high=15, length=1.5, amplitude=0.1)",),
@@ -46,9 +46,8 @@ ALONE = [
     ("learned(coordinate=time wave, period=300, amplitude=0.1)",),
     ("thermal_bias(tau=0.5)", "learned(coordinate=temperature rate, tau=100, length=1.5)"),
     ("bias", "scale", "nonorthogonality", "thermal_bias", "bias_drift", "vibration_rectification"),
-    ("quadratic_scale", "saturation"),
 ]
-"""Effects, some shapes of them, and some models."""
+"""Each effect before one that acts last, all at once, and some shapes of them."""
 CONTENT = {
     "campaign": "made", "sensor": "a */ b", "model": "m", "approach": "gravity",
     "n_positions": 24, "quality": Quality(state="accepted"), "sigma_reading_mps2": 0.01,
@@ -155,15 +154,15 @@ needs_cc = pytest.mark.skipif(shutil.which("cc") is None, reason="there is no C 
 
 @pytest.fixture(scope="module")
 def double(tmp_path_factory):
-    """Each effect by itself, in double precision."""
-    made = {specs: calibration_with(specs) for specs in ALONE}
+    """Models in double precision."""
+    made = {specs: calibration_with(specs) for specs in SOME}
     return Library(made, tmp_path_factory.mktemp("c"), double=True)
 
 
 @pytest.fixture(scope="module")
 def single(tmp_path_factory):
-    """Pairs of effects, one that clips, and one that takes counts, in single precision."""
-    made = {specs: calibration_with(specs) for specs in PAIRS}
+    """All effects, one that clips, and one that takes counts, in single precision."""
+    made = {ALL: calibration_with(ALL)}
     made[CLIPS] = calibration_with(CLIPS, values=[1.0, 1.0, 1.0])
     linear = calibration_with(("bias", "scale", "nonorthogonality", "quadratic_scale"))
     mended = Correction(error="axis_error", reason="x is y", matrix=TURN.tolist())
@@ -174,7 +173,7 @@ def single(tmp_path_factory):
 
 
 @needs_cc
-@pytest.mark.parametrize("specs", ALONE, ids=" ".join)
+@pytest.mark.parametrize("specs", SOME, ids=" ".join)
 def test_c_of_each_effect_is_what_apply_does(specs, double):
     """Forces; also after the session, when drifts have ended."""
     calibration, known = double.calibrations[specs], conditions(60, until=2000.0)
@@ -186,14 +185,13 @@ def test_c_of_each_effect_is_what_apply_does(specs, double):
 
 
 @needs_cc
-@pytest.mark.parametrize("specs", PAIRS, ids=" ".join)
-def test_c_of_each_pair_gives_the_force_that_made_the_reading(specs, single):
+def test_c_in_single_precision_gives_the_force_that_made_the_reading(single):
     """Readings are composed by NumPy; the error is below what the head of a header says."""
     known = conditions(40)
     for size in (0.6, 1.45):
         forces = attitudes(40, size)
-        readings = readings_of(single.calibrations[specs], forces, holds(known))
-        force = single(specs, readings, known)
+        readings = readings_of(single.calibrations[ALL], forces, holds(known))
+        force = single(ALL, readings, known)
         np.testing.assert_allclose(force, forces, rtol=0, atol=size * 1.1e-5)
 
 
@@ -234,7 +232,7 @@ def test_c_takes_counts_in_the_axes_of_the_log(frame, single):
 
 
 def test_a_header_says_what_it_takes_and_where_it_is_from():
-    header = c_header(calibration_with(tuple(EFFECTS)))
+    header = c_header(calibration_with(ALL))
     comment = " ".join(header[: header.index("*/")].replace("\n *", " ").split())
     for words in ("temperature: degC", "g = 9.81 m/s^2", "b_T_x = ", "Verdict: accepted"):
         assert words in comment

@@ -47,15 +47,9 @@ def test_a_design_says_what_it_brings(made):
         error.rms_of_all(estimability(scheme, NINE, ROBOT).cofactors)[0] / MGON,
         rel=1e-5,
     )
-    assert content["design"]["constraints"] == [
-        "roll from -110 gon to 110 gon",
-        "at least 15 gon from the roll pole",
-    ]
     assert 0.5 < content["design"]["efficiency"] <= 1
     rolls = [row["roll_gon"] for row in content["positions"]]
     assert min(rolls) >= -110.001
-    shown = [float(row.split()[1]) for row in said.splitlines()[1:9]]
-    np.testing.assert_allclose(shown, rolls, atol=0.0056)  # both rounded
 
 
 def test_a_design_is_made_again_to_the_bit_and_replaces_nothing(tmp_path):

@@ -84,10 +84,6 @@ def test_a_large_effect_is_named_confirmed_and_placed_where_its_formula_has_it(e
         assert any(line.startswith(said) for line in verdict_lines(found))
 
 
-def test_noise_lives_nowhere():
-    assert diagnose(campaign(11), NINE).like == ()
-
-
 @pytest.mark.parametrize(("tau", "seed"), [(100, 0), (1200, 2)])
 def test_a_warm_up_far_above_the_noise_needs_no_second_effect(tau, seed):
     """However large it is, and though no time constant of the grid fits it."""

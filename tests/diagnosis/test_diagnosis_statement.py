@@ -103,11 +103,6 @@ def test_what_is_certain_of_a_set_and_what_is_open(explanations, certain, beside
      "an error in the attitude of the rig: base tilt, encoder offset or encoder scale"),
     ([("bias_drift", 0.5), ("warm_up+hysteresis", 0.42)],
      "a slow change in time (bias drift or warm up), and perhaps hysteresis"),
-    ([("hysteresis", 0.68), ("coloured_noise", 0.25)], "hysteresis, unless it is coloured noise"),
-    ([("bias_drift+hysteresis", 0.5), ("saturation", 0.45)],
-     "bias drift with hysteresis, or saturation"),
-    ([("bias_drift", 0.5), ("warm_up", 0.3), ("coloured_noise", 0.12)],
-     "a slow change in time: bias drift or warm up, unless it is coloured noise"),
     # what has next to no probability is left to the page
     ([("bias_drift", 0.55), ("warm_up", 0.3), ("warm_up+settling", 0.04), ("unknown", 0.03)],
      "a slow change in time: bias drift or warm up"),
@@ -126,13 +121,6 @@ def test_what_is_certain_of_the_unknown_comes_first():
          "has no name here."),
         ([*rare, ("warm_up", 0.2), ("warm_up+quadratic_scale", 0.17)],
          f"{slow}, and perhaps hysteresis, settling, saturation or quadratic scale."),
-        ([("warm_up+scale_asymmetry", 0.5), ("warm_up+quadratic_scale", 0.49)],
-         "The model lacks warm up and an even nonlinearity (scale asymmetry or quadratic scale); "
-         "what is missing beside it has no name here."),
-        ([("warm_up+scale_asymmetry", 0.5), ("warm_up+unknown", 0.45)],
-         "The model lacks warm up, and scale asymmetry or something that is not in the catalogue."),
-        ([("warm_up+unknown", 0.99)],
-         "The model lacks warm up; what is missing beside it has no name here."),
     ):  # fmt: skip
         assert without_a_name(statement_of(made(*explanations), cosine)) == says
 

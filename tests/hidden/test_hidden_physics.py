@@ -245,15 +245,6 @@ def test_the_noise_is_what_it_is_said_to_be(kind):
         assert np.mean(scaled**4) > 4.5
 
 
-@pytest.mark.parametrize(("share", "seen"), [(1e-6, True), (1e-16, False)])
-def test_what_is_only_rounding_of_the_readings_cannot_be_seen(share, seen):
-    """A processor rounds as it likes; what is left of rounding is as large as the rounding."""
-    of_design = oracle("spread-24", "robot")
-    warm_up = replace(EFFECTS["warm_up"], typical=share)
-    shape = of_design.shape(warm_up, {"tau": 600.0})
-    assert (shape is not None) == seen
-
-
 # --- the oracle ----------------------------------------------------------------------------------
 
 
@@ -273,15 +264,3 @@ def test_the_oracle_keeps_its_level_and_knows_what_is_large():
         assert truth.oracle.detected
         assert truth.oracle.best == truth.oracle.told
     assert np.mean(right) > 0.85
-
-
-def test_pairs_hold_what_a_least_squares_fit_of_both_effects_explains():
-    knowing = oracle("hand-18", "robot")
-    pairs, shapes = knowing.pairs, knowing.shapes
-    z = knowing.conditions.left(np.random.default_rng(16).standard_normal((1, 54)))[0]
-    found = pairs.parts(z)
-    for k in range(0, len(found), 37):
-        both = np.column_stack([shapes[pairs.first[k]].basis, shapes[pairs.second[k]].basis])
-        fitted = both @ np.linalg.lstsq(both, z, rcond=1e-2)[0]
-        assert found[k] == pytest.approx(fitted @ fitted, rel=1e-6)
-        assert pairs.dims[k] == np.linalg.matrix_rank(both, tol=1e-2)

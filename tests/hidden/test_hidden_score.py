@@ -249,7 +249,3 @@ def test_figures_of_much_and_of_nothing(judged):
         drawn = {name: draw() for name, draw in figures("score", made).items()}
         assert [*drawn] == [*SCORES["score"]["figures"]]
         assert all(figure.axes for figure in drawn.values())
-    (ax,) = [ax for ax in figures("score", judged)["calibration"]().axes]
-    stated, true = ax.containers[0].lines[0].get_data()
-    assert stated == pytest.approx([0.8])  # of all with a set, three of seven
-    assert true == pytest.approx([3 / 7])

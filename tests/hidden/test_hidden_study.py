@@ -12,7 +12,7 @@ from studies.hidden import campaigns, study
 from studies.hidden.baselines import METHODS
 from studies.hidden.campaigns import parse_hidden, read_rows, row_of, run
 from studies.hidden.physics.generate import Case
-from studies.hidden.study import JOB, KINDS, removed
+from studies.hidden.study import KINDS, removed
 
 TINY = {
     "study": "tiny",
@@ -61,16 +61,6 @@ def test_the_full_study():
     assert len({case.name for case in cases}) == len({*cases})
 
 
-def test_the_small_study_overlays_the_full_one():
-    content = overlay(
-        read_layer(ROOT / "studies/hidden/config/hidden-effects.yaml"),
-        read_layer(ROOT / "studies/hidden/config/hidden-smoke.yaml"),
-    )
-    config = parse_hidden(content)
-    assert config.most < 40
-    assert len(config.jobs) == 1
-
-
 # --- campaigns and seeds --------------------------------------------------------------------------
 
 
@@ -86,14 +76,6 @@ def test_a_further_kind_and_further_campaigns_change_no_seed():
     assert before.items() <= after.items()
     assert len(set(after.values())) == len(after) > len(before)
     assert not {*before.values()} & {*seeds(TINY, 4).values()}
-
-
-def test_jobs_hold_each_campaign_once():
-    config = parse_hidden(overlay(TINY, {"nothing": {"campaigns": 2 * JOB}}))
-    parts = [config.job(name) for name in config.jobs]
-    assert [one for part in parts for one in part] == config.campaigns()
-    assert len(parts) == 3
-    assert max(map(len, parts)) == JOB
 
 
 def test_a_family_that_is_taken_out():

@@ -5,7 +5,7 @@ import re
 import numpy as np
 import pandas as pd
 import pytest
-from places import DATA, ROOT, needs_data
+from places import ROOT
 from scipy import optimize, stats
 from snakemake_helpers import snakemake
 
@@ -50,13 +50,6 @@ def log(tmp_path_factory):
     donor = Donor(NAME, path, ImportSettings(block=SIZE), 30.0)
     OURS._opened[NAME] = donor
     return donor
-
-
-def test_the_sensor_of_a_log_is_found(log):
-    assert log.sensor.bias == pytest.approx([0.1, -0.05, 0.02], abs=0.01)
-    assert log.sensor.scale == pytest.approx([0.01, -0.01, 0.005], abs=1e-3)
-    assert log.sigma == pytest.approx(SIGMA / np.sqrt(SIZE), rel=0.5)
-    assert log.redundancy == COUNT - 9
 
 
 def test_an_effect_is_put_into_each_reading(log):
@@ -181,18 +174,6 @@ def test_what_an_answer_says(campaigns, expected, given):
 def test_where_the_logs_are_changes_no_number():
     moved = CONFIG.model_copy(update={"public_folder": "elsewhere"})
     assert moved.fingerprint == CONFIG.fingerprint
-
-
-@needs_data
-def test_what_is_beside_a_large_effect_has_an_answer():
-    """It is found in what the refit leaves, whose slopes tell otherwise than those of the fit."""
-    name = "mpu9150-2"
-    config = CONFIG.model_copy(update={"public_folder": str(DATA)})
-    case = LogCase("two", name, effect=("thermal_bias", "cubic_scale"), lam=(400.0, 400.0),
-                   recorded=True)  # fmt: skip
-    row = row_of(config, case, 4)
-    assert row["error"] == ""
-    assert "thermal_bias" in row["found"]
 
 
 def test_the_workflow_makes_each_log_and_the_score(tmp_path):

@@ -12,7 +12,7 @@ from accelstudy.sensors.models import compose
 
 # What the gravity-based calibration of 24 positions leaves.
 SIGMA = np.repeat([0.707e-3, 102e-6, 10.26 * MGON], 3)
-BIAS, SCALE = compose("bias", ("bias",)), compose("scale", ("scale",))
+BIAS = compose("bias", ("bias",))
 CUBIC = compose("cubic", ("bias", "scale", "nonorthogonality", "cubic_scale"))
 
 
@@ -104,15 +104,6 @@ def test_a_large_error_of_the_mean_is_not_linearised():
 
 
 # --- closed forms --------------------------------------------------------------------------------
-
-
-def test_a_common_scale_does_not_tilt():
-    f_b = cap_forces(50 * GON, 30)
-    error = leveling_error(SCALE, np.full(3, 1e-3), SCALE, np.zeros((2, 3)), f_b)
-    assert error.per_replicate.max() < 1e-12
-    unequal = leveling_error(SCALE, np.array([1e-3, 0, 0]), SCALE, np.zeros((2, 3)), f_b)
-    assert unequal.rms[1] > 1e-4
-    assert unequal.rms[0] < 1e-12  # roll does not contain f_x
 
 
 def test_roll_wraps():

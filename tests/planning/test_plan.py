@@ -28,7 +28,6 @@ from accelstudy.planning.reasons import errors_in_use, limits, spoilers
 from accelstudy.planning.simulated import cell_of
 from accelstudy.planning.wording import part_lines
 from accelstudy.schemes import get_scheme
-from accelstudy.sensors.models import get_model
 from accelstudy.simulation.sessions import Noise
 from accelstudy.study.statistics import simulated_statistics
 
@@ -122,12 +121,6 @@ def test_the_quantile_is_that_of_draws():
         np.testing.assert_allclose(expected.quantile(share), drawn, rtol=0.03)
         both = np.sqrt(np.quantile(squares.max(axis=1), share))
         assert expected.quantile_of_both(share) == pytest.approx(both, rel=0.04)
-
-
-def test_a_rotation_that_gravity_cannot_see_makes_no_candidate():
-    turned = get_model(f"{NINE.name}-crossaxis")
-    assert left(turned, {}, "gravity") is None
-    assert left(turned, {}, "robot") is not None
 
 
 # --- candidates and their ranking ----------------------------------------------------------------
@@ -358,12 +351,6 @@ def test_a_share_of_the_calibrations_is_of_both_angles_at_once():
     # One angle alone would make fewer positions seem enough.
     alone = by_hand(found.scheme.directions, 30 * GON)
     assert np.quantile(alone, 0.95, axis=0).max() < 0.96 * 20 * MGON
-
-
-def test_with_a_robot_five_positions_do_what_four_do_not(plan):
-    robot = next(r for r in plan.ranked if r.equipment == ROBOT)
-    assert robot.scheme.n_positions == 5
-    assert CalibrationKind.of(plan.question, robot).best(4).tilt.rms.max() > 10 * MGON
 
 
 @pytest.mark.parametrize("name", ["adxl355", "mpu-6050", "stim300"])

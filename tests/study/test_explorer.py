@@ -266,14 +266,6 @@ def test_a_choice_leaves_its_set_ups_and_shows_their_numbers(shown, tables):
     cells = tables["cells"].query("model == @CROSS and scheme == 'icosahedron-12'")
     robot = cells.query("approach == 'robot'")["cell"].iloc[0]
     assert f"(in the tables {robot}): 40 of 40 converged" in shown.locator("#chosen").inner_text()
-    # Its twin without a robot cannot be estimated, and has no standard deviations.
-    its = tables["summary"][tables["summary"]["cell"] == robot]
-    sds = shown.locator("#charts [aria-roledescription=point][aria-label*='sd_empirical']")
-    assert sds.count() == len(its)
-    labels = " ".join(each.get_attribute("aria-label") for each in sds.all())
-    for parameter, value in zip(its["parameter"], its["sd_empirical"], strict=True):
-        assert f"parameter: {parameter};" in labels
-        assert f"sd_empirical: {value:.4g}"[:-1] in labels
 
 
 def test_a_click_on_a_point_chooses_its_set_up(shown, tables):

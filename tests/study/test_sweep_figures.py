@@ -72,21 +72,6 @@ def test_the_head_names_model_and_held_values_and_the_legend_lies_within(factori
     assert title.endswith("robot noise 5 mgon (one of 3)")
 
 
-def test_angles_are_shown_in_degrees_where_the_study_says_so(factorial):
-    study, tables = factorial
-    gon, deg = (
-        draw("sweep-robot-noise", tables, study.model_copy(update={"angle_unit": unit})).axes
-        for unit in ("gon", "deg")
-    )
-    for place, ratio in ((0, 1), (4, 0.9)):
-        for one, other in zip(gon[place].get_lines(), deg[place].get_lines(), strict=True):
-            np.testing.assert_allclose(other.get_xdata(), 0.9 * np.array(one.get_xdata(), float))
-            if one.get_transform() == gon[place].transData:
-                before = np.array(one.get_ydata(), float)
-                np.testing.assert_allclose(other.get_ydata(), ratio * before)
-    assert deg[4].get_ylabel() == "pitch error\nrms / mdeg"
-
-
 def test_the_unit_of_the_user_holds_where_the_study_names_none(monkeypatch):
     study = study_of(grid())
     monkeypatch.setenv("ACCELSTUDY_ANGLE_UNIT", "deg")

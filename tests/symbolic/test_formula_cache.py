@@ -20,7 +20,7 @@ from accelstudy.sensors.sensor import not_affine
 from accelstudy.sensors.trace import trace_of
 from accelstudy.simulation.sessions import Noise, session
 from accelstudy.symbolic import formula_cache
-from accelstudy.symbolic.tracing import TracedFunction, symbolic, symbols
+from accelstudy.symbolic.tracing import TracedFunction
 
 MODEL = "bias+scale+saturation(knee=8)[k_sat_z]+thermal_bias+encoder_offset"
 PACKAGE = Path(accelstudy.__file__).parent
@@ -81,11 +81,6 @@ def test_a_later_process_loads_no_sympy():
     here = get_model("bias-scale").sense([[0.0, 0.0, -9.8]], [0.001] * 6).tolist()
     ran = subprocess.run([sys.executable, "-c", LATER], capture_output=True, text=True, check=True)
     assert ran.stdout.splitlines() == ["[]", str(here), "False"]
-
-
-def test_functions_of_symbols():
-    (x,) = symbols("x")
-    assert symbolic.maximum(x, 2 * x).diff(x).subs(x, 3) == 2
 
 
 def test_different_formulas_have_different_keys():
