@@ -12,7 +12,6 @@ from functools import cache
 from types import SimpleNamespace
 
 import numpy as np
-import pandas as pd
 import pytest
 from calling import succeed
 from places import DATA, needs_data
@@ -197,37 +196,6 @@ def test_ctu_parameters(known):
 
 
 # --- Data that tell less -------------------------------------------------------------------------
-
-
-@pytest.fixture(scope="module")
-def six_positions(tmp_path_factory):
-    """The six positions of Ferraris, cut at the samples that its authors noted."""
-    folder = tmp_path_factory.mktemp("ferraris")
-    session = pd.read_csv(DATA / "ferraris/example_ferraris_session.csv")
-    notes = json.loads((DATA / "ferraris/example_ferraris_session_list.json").read_text())
-    sections = [s for name, s in notes.items() if not name.endswith("rot")]
-    forces = session[["acc_x", "acc_y", "acc_z"]]
-    means = folder / "means.csv"
-    held = [forces[s["start"] : s["end"]].mean() for s in sections]
-    pd.DataFrame(held).to_csv(means, index=False)
-    succeed("import", means, "--means", "--gravity", 9.81, "--out", folder / "six")
-    return folder / "six"
-
-
-def test_ferraris_determines_six_parameters(six_positions, tmp_path):
-    """They are near the half sums and half differences of opposite positions.
-
-    Exactly so if the sensor stood upright; at an angle of ε they differ by g ε²/2.
-    """
-    content = calibrated(six_positions, tmp_path, "bias-scale")
-    assert "no redundancy" in content["quality"]["verdict"]
-    found = {entry["name"]: entry["value"] for entry in content["parameters"]}
-    means = pd.read_csv(six_positions / "positions.csv")[["fx", "fy", "fz"]].to_numpy()
-    half = 9.81 * math.radians(5) ** 2 / 2
-    for i, axis in enumerate("xyz"):
-        up, down = means[2 * i, i], means[2 * i + 1, i]
-        assert found[f"b_{axis}"] == pytest.approx((up + down) / 2, abs=half)
-        assert 1 + found[f"s_{axis}"] == pytest.approx((up - down) / 2 / 9.81, abs=half / 9.81)
 
 
 def test_ferraris_rests_between_its_turns_too(known):

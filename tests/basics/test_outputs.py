@@ -101,14 +101,6 @@ def test_a_result_whose_files_are_moved_in_part_is_not_taken_for_whole(tmp_path,
     assert content(tmp_path) == {"out/report.html": b"old"}
 
 
-def test_messages_name_the_place_that_was_asked_for(tmp_path):
-    with (
-        pytest.raises(InputError, match=f"^{tmp_path}/out/campaign.yaml: wrong$"),
-        CAMPAIGN.place(tmp_path / "out") as folder,
-    ):
-        raise InputError(f"{folder / 'campaign.yaml'}: wrong")
-
-
 # --- what is refused -----------------------------------------------------------------------------
 
 
@@ -228,16 +220,6 @@ def commands(folder, out):
         "import": ("import", folder / "means.csv", "--means", "--out", out),
         "truth": ("simulate-campaign", "--out", f"{out}-campaign", "--truth", out),
     }
-
-
-def test_a_pipe_is_not_taken_for_the_output(measured, tmp_path):
-    end, start = os.pipe()
-    os.write(start, (measured / "calibrated/calibration.json").read_bytes())
-    os.close(start)
-    out = tmp_path / "out.csv"
-    succeed("apply", f"/dev/fd/{end}", measured / "log.csv", "--out", out)
-    os.close(end)
-    assert out.is_file()
 
 
 @pytest.mark.usefixtures("drawn")  # figures are what does not fit

@@ -20,7 +20,6 @@ from accelstudy.jobs import code_version
 from accelstudy.schemes import get_scheme
 from accelstudy.sensors.models import get_model
 from accelstudy.study.config import read_study
-from accelstudy.symbolic.formula_cache import key_of
 
 EXAMPLES = ROOT / "examples"
 RIPPLE = EXAMPLES / "effect" / "ripple.py"
@@ -61,14 +60,6 @@ def test_a_file_is_loaded_once_wherever_it_is_named():
     shutil.copy("ripple.py", "copy.py")
     plugins.load_files(["ripple.py", "ripple.py", Path("ripple.py").resolve(), "copy.py"])
     assert plugins.loaded_files() == ["ripple.py"]
-
-
-def test_nothing_made_of_its_formulas_is_kept_on_disk():
-    """What is kept has a key of the code that made it, and that of a plug-in may be anything."""
-    plugins.load_files(["ripple.py"])
-    assert key_of(type(get_effect("bias"))) is not None
-    assert key_of(type(get_effect("ripple"))) is None
-    assert key_of(type(get_effect("ripple[a_ripple_x]"))) is None
 
 
 # --- configurations ------------------------------------------------------------------------------

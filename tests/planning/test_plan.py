@@ -216,15 +216,6 @@ def test_what_cannot_be_reached_is_one_line_with_what_can(target, options, said)
     assert "\n" not in line
 
 
-def test_the_way_by_hand_stays_in_the_table_however_long_it_takes():
-    slow = replace(BY_HAND, moving=600.0)
-    result = answer(asked(equipment=(slow, ROBOT)), replicates=500)
-    assert result.first.equipment == slow
-    assert len(result.ranked) <= 8
-    assert result.ranked[-1].equipment == slow
-    assert part_lines("answer", result)[0].startswith("You need no robot.")
-
-
 # --- against simulations that share no code ------------------------------------------------------
 
 

@@ -151,25 +151,6 @@ def test_a_bumped_position_is_named_and_to_be_repeated(begun):
     assert "to go: about 1 position" in left_out
 
 
-@pytest.mark.parametrize(("n", "bumped"), [(10, []), (14, [3]), (17, [16]), (30, []), (30, [5, 9])])
-def test_it_judges_as_the_calibration_does(begun, n, bumped):
-    """It said that one can stop where the calibration was rejected, and set positions aside."""
-    measured, promise = read_campaign(begun(n, bumped=bumped), running=True), Promise(1.0, 50 * GON)
-    advice = advice_for(
-        measured, get_model(MODEL), get_approach("gravity"), promise, candidate_positions("cube")
-    )
-    calibrated = fit_campaign(measured, get_model(MODEL), get_approach("gravity"))
-    assert (
-        advice.calibration_state
-        == calibrated.state
-        == ("rejected" if bumped else "accepted" if n > 11 else "cannot tell")
-    )
-    np.testing.assert_allclose(advice.rms, calibrated.tilt.total, rtol=1e-12)
-    suspects = [*calibrated.suspects]
-    assert list(advice.in_conflict) == sorted(suspects)
-    assert advice.enough == (not bumped)
-
-
 def test_it_never_says_enough_where_the_calibration_is_rejected():
     """Sessions of sensors with effects that the model lacks, and of a noise that is wrongly stated.
 

@@ -42,17 +42,6 @@ def known(rows, determined):
     return Knowledge(Information.of(rows), 0.0 if determined else np.nan, len(rows) - 9)
 
 
-def test_of_positions_that_are_as_good_the_first_is_chosen():
-    """A position and its opposite tell of roll and pitch alike, but for the last attitude."""
-    measured = chooser("gravity", "mclaren-24").rows.reshape(-1, 9)
-    directions = np.repeat(get_scheme("faces-edges-corners-26").directions[[7, 20]], 2, axis=0)
-    of_four = chooser("gravity", "", directions)
-    rms = np.full(2, 20 * MGON)
-    first = of_four.choose(known(measured, True), rms, None)
-    assert first in (0, 2)
-    assert of_four.choose(known(measured, True), rms, directions[first]) == 2 - first
-
-
 def test_nine_positions_by_determinant_determine_nine_parameters():
     of_cube, chosen = chooser("gravity", "faces-edges-corners-26"), []
     for _ in range(9):
