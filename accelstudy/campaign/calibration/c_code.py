@@ -1,42 +1,31 @@
 """A calibration as functions in C99, generated from the formulas of its effects.
 
-The force in the sensitive axes is solved for by Newton's method, with as many steps as it takes
-wherever the calibration holds.
+The force in the sensitive axes is solved for by Newton's method.
 """
 
 from __future__ import annotations
 
 from collections.abc import Mapping
-from itertools import islice
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from accelstudy import __version__
-from accelstudy.basics.errors import InputError
-from accelstudy.basics.units import MGON
-from accelstudy.campaign.calibration.sensor_calibration import (
-    RANGE_MARGIN,
-    SensorCalibration,
-)
+from accelstudy.campaign.calibration.sensor_calibration import SensorCalibration
 from accelstudy.effects.components import AXES
 from accelstudy.effects.hold_symbols import HoldSymbols
 from accelstudy.pages import render_text
-from accelstudy.positions.points import evenly_spread
 from accelstudy.symbolic.algebra import sp
 from accelstudy.symbolic.tracing import derivative, symbolic, symbols
 
 Array = NDArray[np.float64]
 
-MAX_SOLUTION_ERROR = 1e-6
-"""m/s², largest error of a solution by Newton steps."""
 MAX_STEPS = 25
 """Newton steps after which there is no solution."""
-FORCES = (0.5, 1.0, 1.5)
-"""Parts of g at which the steps are counted."""
-DIRECTIONS = 60
-"""Directions in which they are counted."""
+LAST_STEP = 1e-4
+"""m/s², size of the step that is the last one. What it leaves is of the order of its square, and
+rounding in single precision is smaller than it."""
 MAX_ROUNDING_ERROR = 1e-5
 """m/s², bound of all rounding errors in single precision, at 1 g."""
 FORCE = tuple(f"f_{axis}" for axis in AXES)
@@ -53,14 +42,14 @@ def c_header(calibration: SensorCalibration, real: str = "float") -> str:
     Raises
     ------
     InputError
-        If an effect depends on what no device knows, or no force explains a reading.
+        If an effect depends on what no device knows.
     """
     calibration.check_device()
     model, p, raw = calibration.model, calibration.parameters, calibration.conversion
     frame, write = calibration.usual_layout.axes, _Writer(real)
     offset, zero = np.broadcast_to(raw.offset, 3), np.zeros(3)
     linear = calibration.mending @ frame.matrix * raw.scale
-    lines, output, columns, steps = list[str](), list[str](), set[str](), 1
+    lines, output, columns = list[str](), list[str](), set[str]()
     if affine := model.affine(p):
         k, bias = affine
         k = frame.matrix.T @ k
@@ -70,7 +59,6 @@ def c_header(calibration: SensorCalibration, real: str = "float") -> str:
         entries = {f"slope[{i}][{j}]": slope[i, j] for i in range(3) for j in range(3)}
         lines = write.assigned(_entries("output", out) | entries)
         columns = {str(symbol) for symbol in out.free_symbols - {*symbols(*FORCE)}}
-        steps = _steps(calibration) if slope.free_symbols & {*symbols(*FORCE)} else 1
         body = frame.matrix.T @ model.axes_matrix(p)
         output = write.affine("output", linear, "reading", offset, zero)
         force = write.affine("force", body, "f", zero, zero)
@@ -81,13 +69,11 @@ def c_header(calibration: SensorCalibration, real: str = "float") -> str:
         sigmas=np.sqrt(np.diag(calibration.covariance)),
         layout=calibration.usual_layout,
         end=calibration.ranges.get("time_s", (0.0, None))[1],
-        bound=MAX_SOLUTION_ERROR,
-        bound_mgon=MAX_SOLUTION_ERROR / calibration.gravity / MGON,
-        largest=FORCES[-1],
+        steps=MAX_STEPS,
+        last_step=LAST_STEP,
         rounding=MAX_ROUNDING_ERROR,
         lines=lines,
         columns=columns,
-        steps=steps,
         output=output,
         force=force,
         real=real,
@@ -128,27 +114,6 @@ def _output(calibration: SensorCalibration) -> tuple[Any, Any]:
                 hold.drifts = effect.drifts
                 output += sp.Matrix(effect.output(force, p[columns], g, hold, symbolic))
     return output, derivative(output, symbols(*FORCE))
-
-
-def _steps(calibration: SensorCalibration) -> int:
-    """Count the steps to forces of all sizes, until the last is below the bound.
-
-    Outputs that no force explains do not count.
-    """
-    model, p, g = calibration.model, calibration.parameters, calibration.gravity
-    forces = np.concatenate([part * g * evenly_spread(DIRECTIONS) for part in FORCES])
-    forces, hold = calibration.with_conditions(forces, model.hold_columns, RANGE_MARGIN)
-    sizes: list[Array] = []
-    with np.errstate(all="ignore"):
-        output = model.sense(forces, p, g, hold)
-        for _, step in islice(model.newton(output, p, g, hold), MAX_STEPS):
-            sizes.append(np.abs(step).sum(axis=1))
-            if np.all(sizes[-1] < MAX_SOLUTION_ERROR):
-                break
-    solved = sizes[-1] < MAX_SOLUTION_ERROR
-    if not solved.any():
-        raise InputError(f"the model {model.name!r} with these parameters has no inverse")
-    return 1 + int(np.argmax((np.array(sizes)[:, solved] < MAX_SOLUTION_ERROR).all(axis=1)))
 
 
 def _entries(name: str, vector: Any) -> dict[str, Any]:

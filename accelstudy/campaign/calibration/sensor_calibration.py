@@ -136,7 +136,7 @@ class SensorCalibration:
             )
 
     def with_conditions(
-        self, forces: Array, columns: Collection[str], margin: float = 0.0
+        self, forces: Array, columns: Collection[str]
     ) -> tuple[Array, HoldConditions]:
         """Combine forces with conditions, spread over the ranges of the calibration.
 
@@ -146,7 +146,6 @@ class SensorCalibration:
         ----------
         forces : (n, 3) array, m/s²
         columns : names of what varies
-        margin : float, part of the width by which a range is left on either side
 
         Returns
         -------
@@ -155,17 +154,14 @@ class SensorCalibration:
         """
         levels = []
         for column, name in KNOWN.items():
-            is_warm = column == "temperature"
-            low, high = self.ranges.get(name, 2 * [REFERENCE_TEMPERATURE if is_warm else 0.0])
-            more, least = margin * (high - low), -np.inf if is_warm else 0.0
-            count = LEVELS if high > low and column in columns else 1
-            levels.append(np.linspace(max(low - more, least), high + more, count))
+            usual = REFERENCE_TEMPERATURE if column == "temperature" else 0.0
+            low, high = self.ranges.get(name, (usual, usual))
+            levels.append(np.linspace(low, high, LEVELS if column in columns else 1))
         grid = np.stack(np.meshgrid(*levels, indexing="ij"), axis=-1).reshape(-1, len(levels))
-        each = np.repeat(grid, len(forces), axis=0).T
+        each, forces = np.repeat(grid, len(forces), axis=0).T, np.tile(forces, (len(grid), 1))
         conditions: dict[str, Any] = dict(zip(KNOWN, each, strict=True))
-        conditions |= dict.fromkeys(("step_x", "step_y", "step_z"), np.zeros(each.shape[1]))
         course = TemperatureCourse(np.zeros(1), np.full(1, REFERENCE_TEMPERATURE))
-        return np.tile(forces, (len(grid), 1)), HoldConditions(**conditions, course=course)
+        return forces, HoldConditions(**conditions, course=course).with_steps(0 * forces)
 
     def correct(self, forces: ArrayLike, hold: HoldConditions | None = None) -> Array:
         """Calibrated specific force of readings.
