@@ -80,22 +80,18 @@ def check_sigmas(fit: CampaignFit, replicates: int = 2000, seed: int = 1) -> pd.
         )
     sd = errors.std(axis=0, ddof=1)
     low, high = (sd * np.sqrt((n - 1) / special.chdtri(n - 1, p)) for p in (0.025, 0.975))
-    shown = {
-        "estimate": fit.parameters,
-        "sigma": fit.sigma,
-        "sd_empirical": sd,
-        "sd_ci95_low": low,
-        "sd_ci95_high": high,
-        "bias": errors.mean(axis=0),
-    }
-    names, units = zip(*((p.name, p.unit) for p in model.parameters), strict=True)
-    factors = np.array([float(to_display(1.0, unit)) for unit in units])
-    return pd.DataFrame(
+    table = pd.DataFrame(
         {
-            "parameter": names,
-            "unit": list(map(display_unit, units)),
-            **{key: values * factors for key, values in shown.items()},
-            "ratio": fit.sigma / sd,
-            "n_converged": n,
+            "estimate": fit.parameters,
+            "sigma": fit.sigma,
+            "sd_empirical": sd,
+            "sd_ci95_low": low,
+            "sd_ci95_high": high,
+            "bias": errors.mean(axis=0),
         }
     )
+    units = [parameter.unit for parameter in model.parameters]
+    table = table.mul([float(to_display(1.0, unit)) for unit in units], axis=0)
+    table.insert(0, "parameter", model.parameter_names)
+    table.insert(1, "unit", [*map(display_unit, units)])
+    return table.assign(ratio=fit.sigma / sd, n_converged=n)
