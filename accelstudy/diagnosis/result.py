@@ -14,7 +14,7 @@ from scipy import special
 from accelstudy.adjustment.quality import GlobalTest, Solution, global_test, suspects
 from accelstudy.approaches import Approach
 from accelstudy.basics.progress import stage
-from accelstudy.campaign.calibration.campaign_fit import OUTLIER_LEVEL, JudgedNoise
+from accelstudy.campaign.calibration.campaign_fit import OUTLIER_LEVEL, NoiseJudgement
 from accelstudy.campaign.gross_errors.recognition import Recognition
 from accelstudy.campaign.session import Campaign
 from accelstudy.diagnosis.consequences import TiltErrors, tilt_errors
@@ -241,7 +241,7 @@ class CampaignDiagnosis:
         return self.problem.evidence.level.known
 
     @cached_property
-    def noise(self) -> JudgedNoise:
+    def noise(self) -> NoiseJudgement:
         """Whether the residuals of the final fit bear sigma, and the variance that is quoted."""
         return judged_noise(self.problem, self.final)
 

@@ -326,7 +326,7 @@ def _parameters_of(found: LotEffect) -> Sequence[str]:
 
 def _squared_error(fit: CampaignFit, model: SensorModel) -> Array:
     """Square of the error less that by noise: of nested models the difference of covariances."""
-    base = replace(fit_campaign(fit.campaign, model, fit.approach), judged=fit.noise)
+    base = replace(fit_campaign(fit.campaign, model, fit.approach), judgement=fit.noise)
     f_b = cap_forces(MAX_TILT_GON * GON, ATTITUDES, fit.gravity)
     hold = holds_in_use(fit.campaign.hold, fit.campaign.n_positions, f_b)
     error = tilt_error(

@@ -138,7 +138,7 @@ def advise(
     )
     rms = chooser.rms(known)
     if fit is not None and stated:
-        rms = fit.tilt_left(promise.tilt_range).total
+        rms = fit.tilt_budget(promise.tilt_range).total
     enough = bool(promise.is_kept(rms)) and not wrong
 
     last = -campaign.forces[-1] / np.linalg.norm(campaign.forces[-1]) if n else None

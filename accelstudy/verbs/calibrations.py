@@ -15,7 +15,7 @@ if TYPE_CHECKING:
     import pandas as pd
 
     from accelstudy import Calibration, Campaign, Diagnosis, Log
-    from accelstudy.campaign.calibration.leveling import LeveledLog
+    from accelstudy.campaign.calibration.leveling import Leveling
 
 
 @verb
@@ -177,7 +177,7 @@ def apply(
     return table
 
 
-def level_log(calibration: Any, log: Any, **keywords: Any) -> LeveledLog:
+def level_log(calibration: Any, log: Any, **keywords: Any) -> Leveling:
     """Level a log by the keywords of `apply`, checked."""
     from accelstudy.campaign.calibration.leveling import level
     from accelstudy.campaign.calibration.sensor_calibration import sensor_of

@@ -30,7 +30,7 @@ OUTLIER_LEVEL = 0.05
 
 
 @dataclass(frozen=True)
-class TiltLeft:
+class TiltBudget:
     """Rms tilt error that a calibration leaves, without the noise of a reading.
 
     Each is a (2,) array, rad, of roll and of pitch, over all tilts up to a largest one. Effects
@@ -58,7 +58,7 @@ class TiltLeft:
 
 
 @dataclass(frozen=True)
-class JudgedNoise:
+class NoiseJudgement:
     """A judgement of the noise of a campaign.
 
     Attributes
@@ -81,7 +81,7 @@ class CampaignFit:
     observed : Observations, R = 1
     adjustment : Adjustment, R = 1
     estimability : Estimability, of the campaign's own positions
-    judged : JudgedNoise, from a diagnosis; by default the global test of this fit judges the noise
+    judgement : NoiseJudgement, of a diagnosis; by default the global test of this fit judges
     """
 
     campaign: Campaign
@@ -90,7 +90,7 @@ class CampaignFit:
     observed: Observations
     adjustment: Adjustment
     estimability: Estimability
-    judged: JudgedNoise | None = None
+    judgement: NoiseJudgement | None = None
 
     @property
     def parameters(self) -> Array:
@@ -117,19 +117,19 @@ class CampaignFit:
         return self.solution.sigma_dof if np.isfinite(stated) else stated
 
     @cached_property
-    def noise(self) -> JudgedNoise:
+    def noise(self) -> NoiseJudgement:
         """The noise that is quoted, as a diagnosis or the global test judged it.
 
         A stated noise is trusted unless the residuals refute it. If it is itself an estimate it is
         pooled with the residuals; if it is not trusted the noise is that of the residuals.
         """
-        if self.judged is not None:
-            return self.judged
+        if self.judgement is not None:
+            return self.judgement
         test, stated = self.global_test, self.campaign.sigma_force is not None
         if stated and (test is None or test.accepted):
             omega, r = float(self.adjustment.omega[0]), self.adjustment.redundancy
-            return JudgedNoise(True, quality.pooled_variance(omega, r, self.sigma_dof))
-        return JudgedNoise(False, float(self.adjustment.variance_posteriori[0]))
+            return NoiseJudgement(True, quality.pooled_variance(omega, r, self.sigma_dof))
+        return NoiseJudgement(False, float(self.adjustment.variance_posteriori[0]))
 
     @property
     def dof(self) -> float:
@@ -243,9 +243,9 @@ class CampaignFit:
         return variance_components(self.model, self.approach, self.observed)
 
     @cached_property
-    def tilt(self) -> TiltLeft:
+    def tilt(self) -> TiltBudget:
         """The tilt error that is left over usual tilts."""
-        return self.tilt_left()
+        return self.tilt_budget()
 
     @cached_property
     def implausible(self) -> tuple[str, ...]:
@@ -290,7 +290,7 @@ class CampaignFit:
             return REJECTED
         return UNCHECKED if test is None or test.powerless else ACCEPTED
 
-    def tilt_left(self, max_tilt: float = MAX_TILT_GON * GON) -> TiltLeft:
+    def tilt_budget(self, max_tilt: float = MAX_TILT_GON * GON) -> TiltBudget:
         """Tilt error that a calibration leaves over tilts up to `max_tilt`, rad.
 
         The excess of the residuals over the stated noise is what the model does not describe. An
@@ -317,4 +317,4 @@ class CampaignFit:
             missing = np.sqrt(max(excess, 0.0) * by_output)
         part = self.by_reference
         reference = None if part is None else rms(covariance=part)
-        return TiltLeft(shares, rms(), reference, missing)
+        return TiltBudget(shares, rms(), reference, missing)

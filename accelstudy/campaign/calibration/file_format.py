@@ -50,7 +50,7 @@ Ends = Annotated[
 ]
 
 
-class Shown(Part):
+class Display(Part):
     """The same as people read it.
 
     Attributes
@@ -86,7 +86,7 @@ class Parameter(Part):
     sigma_priori: float | None = None
     sigma_posteriori: float | None = None
     unit: str
-    shown: Shown | None = None
+    shown: Display | None = None
 
 
 class Reference(Part):

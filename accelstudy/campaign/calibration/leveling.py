@@ -59,7 +59,7 @@ def level(
     given: Mapping[str, Any] | None = None,
     sigma: float | None = None,
     start: float | None = None,
-) -> LeveledLog:
+) -> Leveling:
     """Level a log; by default it is read like the log from which the campaign was made.
 
     Parameters
@@ -77,7 +77,7 @@ def level(
         If the log cannot be read, lacks a column that an effect of the calibration needs, or is so
         far from gravity in most rows that it must be in another unit.
     """
-    leveled = LeveledLog(
+    leveled = Leveling(
         calibration, read_log(log, given or {}, calibration.usual_layout), sigma, start
     )
     leveled.check()
@@ -85,7 +85,7 @@ def level(
 
 
 @dataclass(frozen=True, eq=False)
-class LeveledLog:
+class Leveling:
     """A leveled log.
 
     Forces and angles are in the axes of the log. A row has empty cells if a reading is missing, or

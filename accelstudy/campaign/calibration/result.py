@@ -150,7 +150,7 @@ class Calibration(Result):
         ----------
         tilt_range : float in rad or str with a unit, largest tilt
         """
-        left = self._fitted("tilt_error").tilt_left(quantity("tilt_range", tilt_range, TILT))
+        left = self._fitted("tilt_error").tilt_budget(quantity("tilt_range", tilt_range, TILT))
         return pd.Series(left.total, index=["roll", "pitch"], name="tilt_error_rad")
 
     def _fitted(self, what: str) -> CampaignFit:

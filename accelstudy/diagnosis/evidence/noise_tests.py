@@ -16,7 +16,7 @@ from scipy import special
 
 from accelstudy.adjustment.quality import Solution, global_test, pooled_variance
 from accelstudy.basics.levels import REFUTATION_LEVEL
-from accelstudy.campaign.calibration.campaign_fit import JudgedNoise
+from accelstudy.campaign.calibration.campaign_fit import NoiseJudgement
 from accelstudy.campaign.session import Campaign
 from accelstudy.diagnosis.evidence.detection import Chance
 from accelstudy.diagnosis.rules import RULES
@@ -311,14 +311,14 @@ def tests_of_noise(
     return tuple(tests)
 
 
-def judged_noise(problem: Problem, frame: SessionFit) -> JudgedNoise:
+def judged_noise(problem: Problem, frame: SessionFit) -> NoiseJudgement:
     """Judge the noise by the residuals of a fit, which give it where no stated sigma holds."""
     residuals = frame.residuals
     stated, r = problem.evidence.level.known, residuals.redundancy
     if not stated or level_test(residuals, frame.solution.sigma_dof).p_value < REFUTATION_LEVEL:
-        return JudgedNoise(trusted=False, variance=residuals.variance)
+        return NoiseJudgement(trusted=False, variance=residuals.variance)
     omega = r * residuals.variance
-    return JudgedNoise(True, pooled_variance(omega, r, frame.solution.sigma_dof))
+    return NoiseJudgement(True, pooled_variance(omega, r, frame.solution.sigma_dof))
 
 
 def exceeds_stated(problem: Problem, frame: SessionFit) -> bool:

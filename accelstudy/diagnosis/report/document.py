@@ -160,7 +160,7 @@ def diagnosed_fit(diagnosis: CampaignDiagnosis) -> CampaignFit:
             calibrate(d.extended_model, d.approach, observed), cofactors=solution.cofactors[None]
         ),
         estimability=campaign_estimability(campaign, d.extended_model, d.approach),
-        judged=d.noise,
+        judgement=d.noise,
     )
 
 
