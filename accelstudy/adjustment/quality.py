@@ -80,6 +80,7 @@ class Solution:
         parameters directly: of those with a prior, and of observed gravity, which is the last
     omega : float, Ω
     redundancy : int, r
+    iterations : int, that it took
     """
 
     model: SensorModel
@@ -96,6 +97,17 @@ class Solution:
     prior: tuple[Array, Array]
     omega: float
     redundancy: int
+    iterations: int
+
+    @property
+    def sigma_force(self) -> float:
+        """Noise of a force of unit weight, m/s²: the mean over positions and axes."""
+        return float(np.mean(np.asarray(self.observed.sigma_force)))
+
+    @property
+    def variance_posteriori(self) -> float:
+        """Variance of unit weight a posteriori σ̂0² = Ω/r; NaN without redundancy."""
+        return self.omega / self.redundancy if self.redundancy > 0 else np.nan
 
     @cached_property
     def whitening(self) -> Array:
@@ -229,6 +241,7 @@ def solve(
         prior=(np.diag(root_weight)[seen], (root_weight * (x - problem.direct[0]))[seen]),
         omega=float(result.omega[0]),
         redundancy=result.redundancy,
+        iterations=int(result.iterations[0]),
     )
 
 

@@ -305,8 +305,7 @@ def held_out_gap(
 
 def relative_variance(one: Solution, other: Solution) -> float:
     """Ratio of the variances of unit weight of two fits that take different sigmas."""
-    taken = [float(np.mean(np.asarray(fit.observed.sigma_force))) for fit in (one, other)]
-    return (taken[0] / taken[1]) ** 2
+    return (one.sigma_force / other.sigma_force) ** 2
 
 
 class _Prediction(NamedTuple):

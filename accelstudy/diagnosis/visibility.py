@@ -149,7 +149,7 @@ def examine_campaign(
     approach : Approach; by default robot-aided if the campaign has the robot's angles
     """
     fit = fit_campaign(campaign, model, approach)
-    return SessionFit.of(solve(fit.model, fit.approach, fit.observed, fit.adjustment))
+    return SessionFit.of(fit.solution)
 
 
 def examine_scheme(

@@ -188,7 +188,7 @@ class Lot(Result):
         own, noise = fit.sigma**2, self.diagnosis.last.sensors[i].noise
         if fit.noise.trusted or noise is None:
             return own
-        r, ratio = fit.adjustment.redundancy, (noise.sigma / fit.sigma_position_posteriori) ** 2
+        r, ratio = fit.solution.redundancy, (noise.sigma / fit.sigma_position_posteriori) ** 2
         return own * float((r + noise.freedom * ratio) / (r + noise.freedom))
 
     @cached_property

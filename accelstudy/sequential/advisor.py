@@ -124,7 +124,7 @@ def advise(
     wrong = fit is not None and fit.state in (REJECTED, IMPLAUSIBLE)
     noise = campaign_noise(campaign)
     if fit is not None:
-        noise = replace(noise, sigma_force=float(np.mean(np.asarray(fit.observed.sigma_force))))
+        noise = replace(noise, sigma_force=fit.solution.sigma_force)
     holds = next_holds(campaign, directions)
     chooser = Chooser(
         directions,
@@ -185,9 +185,8 @@ def _knowledge(
 ) -> tuple[Knowledge, Array]:
     """What is known so far, and parameters near it: those of the calibration if there is one."""
     if fit is not None:
-        adjustment = fit.adjustment
-        information = Information.of_covariance(adjustment.cofactors[0])
-        known = Knowledge(information, float(adjustment.omega[0]), adjustment.redundancy)
+        information = Information.of_covariance(fit.solution.cofactors)
+        known = Knowledge(information, fit.solution.omega, fit.solution.redundancy)
         return known, fit.parameters
     # The raw readings at the first values of the parameters, and what is known beforehand.
     problem = CalibrationProblem.of(model, approach, campaign_observations(campaign))

@@ -13,7 +13,6 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import stats
 
-from accelstudy.adjustment.quality import solve
 from accelstudy.campaign.calibration.fit import fit_campaign, usual_approach
 from accelstudy.campaign.session import Campaign
 from accelstudy.diagnosis.space.frame import SessionFit
@@ -47,7 +46,7 @@ class Problem:
         for _ in range(0 if self.sigma_known else 2):
             weighted = campaign.with_sigma(fit.sigma_position_posteriori)
             fit = fit_campaign(weighted, model, approach)
-        frame = SessionFit.of(solve(fit.model, fit.approach, fit.observed, fit.adjustment))
+        frame = SessionFit.of(fit.solution)
         self.z, self.redundancy = frame.residuals.z, frame.residuals.redundancy
         candidates = frame.candidates.items()
         self.shapes = [

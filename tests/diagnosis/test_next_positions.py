@@ -105,7 +105,7 @@ def test_effects_of_time_are_told_apart_later():
         scheme="fibonacci-30", interval=60.0, effects=("bias_drift: 1e-5, 1e-5, 1e-5",)
     )
     fit = fit_campaign(campaign, NINE, ROBOT)
-    frame = SessionFit.of(solve(fit.model, fit.approach, fit.observed))
+    frame = SessionFit.of(fit.solution)
     drift, warm = (frame.candidates[name][0] for name in ("bias_drift", "warm_up"))
     found = next_positions(frame, (drift,), (warm,))
     assert all(position.temperature is None for position in found)

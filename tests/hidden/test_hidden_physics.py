@@ -33,9 +33,8 @@ def seeded(*key):
 
 
 def omega(campaign, approach):
-    adjustment = fit_campaign(campaign, NINE, get_approach(approach)).adjustment
-    assert adjustment.converged.all()
-    return float(adjustment.omega[0]), adjustment.redundancy
+    solution = fit_campaign(campaign, NINE, get_approach(approach)).solution
+    return solution.omega, solution.redundancy
 
 
 def imports(folder):

@@ -82,10 +82,10 @@ def test_a_type_is_an_observation_of_the_parameters():
     free, bound = (
         fitted(one) for one in (campaign, replace(campaign, sensor_type=SensorType("t", 9, known)))
     )
-    assert bound.adjustment.redundancy == free.adjustment.redundancy + 9
-    cofactors = np.linalg.inv(np.linalg.inv(free.adjustment.cofactors[0]) + np.diag(sigma**-2))
-    np.testing.assert_allclose(bound.adjustment.cofactors[0], cofactors, rtol=2e-2, atol=1e-9)
-    right = np.linalg.solve(free.adjustment.cofactors[0], free.parameters) + mean / sigma**2
+    assert bound.solution.redundancy == free.solution.redundancy + 9
+    cofactors = np.linalg.inv(np.linalg.inv(free.solution.cofactors) + np.diag(sigma**-2))
+    np.testing.assert_allclose(bound.solution.cofactors, cofactors, rtol=2e-2, atol=1e-9)
+    right = np.linalg.solve(free.solution.cofactors, free.parameters) + mean / sigma**2
     np.testing.assert_allclose(bound.parameters, cofactors @ right, atol=2e-2 * free.sigma.max())
 
 

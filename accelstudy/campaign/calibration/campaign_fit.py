@@ -9,7 +9,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from accelstudy.adjustment import Adjustment, Observations, quality
+from accelstudy.adjustment import quality
 from accelstudy.adjustment.components import VarianceComponents, variance_components
 from accelstudy.approaches import Approach
 from accelstudy.basics.levels import ACCEPTED, IMPLAUSIBLE, REJECTED, UNCHECKED
@@ -77,44 +77,39 @@ class CampaignFit:
 
     Attributes
     ----------
-    campaign, model, approach : what was fitted, with what
-    observed : Observations, R = 1
-    adjustment : Adjustment, R = 1
+    campaign : Campaign
+    solution : Solution, of the adjustment
     estimability : Estimability, of the campaign's own positions
     judgement : NoiseJudgement, of a diagnosis; by default the global test of this fit judges
     """
 
     campaign: Campaign
-    model: SensorModel
-    approach: Approach
-    observed: Observations
-    adjustment: Adjustment
+    solution: quality.Solution
     estimability: Estimability
     judgement: NoiseJudgement | None = None
 
     @property
+    def model(self) -> SensorModel:
+        """Model that was fitted."""
+        return self.solution.model
+
+    @property
+    def approach(self) -> Approach:
+        """Approach by which it was fitted."""
+        return self.solution.approach
+
+    @property
     def parameters(self) -> Array:
         """Estimates of the model's parameters, (u,), SI."""
-        return self.adjustment.parameters[0, : self.model.n_parameters]
+        return self.solution.parameters[: self.model.n_parameters]
 
     @property
     def global_test(self) -> quality.GlobalTest | None:
         """Test of the whole model; None where sigma is unknown or there is no redundancy."""
         if self.campaign.sigma_force is None:
             return None
-        omega, r = float(self.adjustment.omega[0]), self.adjustment.redundancy
-        return quality.global_test(omega, r, sigma_dof=self.sigma_dof)
-
-    @cached_property
-    def solution(self) -> quality.Solution:
-        """The adjustment, linearised at the estimates."""
-        return quality.solve(self.model, self.approach, self.observed, self.adjustment)
-
-    @property
-    def sigma_dof(self) -> float:
-        """Degrees of freedom of the stated noise in Ω; infinite where it is known."""
-        stated = self.observed.sigma_dof
-        return self.solution.sigma_dof if np.isfinite(stated) else stated
+        omega, r = self.solution.omega, self.solution.redundancy
+        return quality.global_test(omega, r, sigma_dof=self.solution.sigma_dof)
 
     @cached_property
     def noise(self) -> NoiseJudgement:
@@ -127,15 +122,15 @@ class CampaignFit:
             return self.judgement
         test, stated = self.global_test, self.campaign.sigma_force is not None
         if stated and (test is None or test.accepted):
-            omega, r = float(self.adjustment.omega[0]), self.adjustment.redundancy
-            return NoiseJudgement(True, quality.pooled_variance(omega, r, self.sigma_dof))
-        return NoiseJudgement(False, float(self.adjustment.variance_posteriori[0]))
+            omega, r = self.solution.omega, self.solution.redundancy
+            return NoiseJudgement(True, quality.pooled_variance(omega, r, self.solution.sigma_dof))
+        return NoiseJudgement(False, self.solution.variance_posteriori)
 
     @property
     def dof(self) -> float:
         """Degrees of freedom of the noise that is quoted; infinite where it is known."""
-        r = self.adjustment.redundancy
-        return self.sigma_dof + r if self.noise.trusted else r
+        r = self.solution.redundancy
+        return self.solution.sigma_dof + r if self.noise.trusted else r
 
     @property
     def is_noise_known(self) -> bool:
@@ -145,24 +140,18 @@ class CampaignFit:
     @property
     def sigma_position(self) -> float:
         """Noise of a position mean to quote, m/s²: as stated if trusted, else a posteriori."""
-        return self._sigma_taken * float(np.sqrt(self.noise.variance))
+        return self.solution.sigma_force * float(np.sqrt(self.noise.variance))
 
     @property
     def sigma_position_posteriori(self) -> float:
         """Noise of a position mean from the residuals, m/s²; NaN without redundancy."""
-        factor = float(self.adjustment.variance_posteriori[0])
-        return self._sigma_taken * float(np.sqrt(factor))
-
-    @property
-    def _sigma_taken(self) -> float:
-        """Noise of a position mean of unit weight, m/s²."""
-        return float(np.mean(np.asarray(self.observed.sigma_force)))
+        return self.solution.sigma_force * float(np.sqrt(self.solution.variance_posteriori))
 
     @property
     def covariance(self) -> Array:
         """Covariance matrix of the model's parameters to quote, (u, u), SI."""
         u = self.model.n_parameters
-        return self.noise.variance * self.adjustment.cofactors[0, :u, :u]
+        return self.noise.variance * self.solution.cofactors[:u, :u]
 
     @property
     def by_reference(self) -> Array | None:
@@ -171,10 +160,11 @@ class CampaignFit:
         It is what would be gone if that calibration had no errors: Q_xc Q_cc⁻¹ Q_cx, with the
         errors c that all holds share. None where no reference was used.
         """
-        if self.observed.common is None or not self.approach.uses_angles:
+        common = self.solution.observed.common
+        if common is None or not self.approach.uses_angles:
             return None
-        q, u = self.adjustment.cofactors[0], self.model.n_parameters
-        shared = slice(u, u + self.observed.common.shape[-1])
+        q, u = self.solution.cofactors, self.model.n_parameters
+        shared = slice(u, u + common.shape[-1])
         part = q[:u, shared] @ np.linalg.solve(q[shared, shared], q[shared, :u])
         return self.noise.variance * part
 
@@ -191,9 +181,7 @@ class CampaignFit:
     @property
     def gravity(self) -> float:
         """Gravity, m/s²: the adjusted value if it was observed."""
-        if self.campaign.header.gravity.sigma_mps2 > 0:
-            return float(self.adjustment.parameters[0, -1])
-        return self.campaign.gravity
+        return self.solution.gravity
 
     @property
     def corrected(self) -> Array:
@@ -224,7 +212,7 @@ class CampaignFit:
         found = quality.suspects(
             self.model,
             self.approach,
-            self.observed,
+            self.solution.observed,
             alpha=OUTLIER_LEVEL,
             sigma_known=self.noise.trusted,
         )
@@ -240,7 +228,7 @@ class CampaignFit:
         """Variance components of accelerometer and robot; None without a robot."""
         if self.campaign.sigma_force is None:
             return None
-        return variance_components(self.model, self.approach, self.observed)
+        return variance_components(self.model, self.approach, self.solution.observed)
 
     @cached_property
     def tilt(self) -> TiltBudget:

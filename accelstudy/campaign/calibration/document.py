@@ -21,9 +21,9 @@ def calibration_document(fit: CampaignFit) -> dict[str, Any]:
 
     All numbers are in SI but those whose key names another unit, and in forward, right, down.
     """
-    campaign, adjustment = fit.campaign, fit.adjustment
-    header = campaign.header
+    campaign, header, solution = fit.campaign, fit.campaign.header, fit.solution
     covariance, sigma = fit.covariance, fit.sigma
+    sigma_priori = np.sqrt(np.diag(solution.cofactors))
     affine = fit.model.affine(fit.parameters)
     ranged = {
         "time_s": campaign.time,
@@ -59,8 +59,8 @@ def calibration_document(fit: CampaignFit) -> dict[str, Any]:
                 "value": fit.parameters[i],
                 "sigma": sigma[i],
                 "ci95": fit.sigmas_95 * sigma[i],
-                "sigma_priori": adjustment.sigma_priori[0, i] if campaign.sigma_force else None,
-                "sigma_posteriori": adjustment.sigma_posteriori[0, i],
+                "sigma_priori": sigma_priori[i] if campaign.sigma_force else None,
+                "sigma_posteriori": sigma_priori[i] * np.sqrt(solution.variance_posteriori),
                 "unit": parameter.unit,
                 "shown": {
                     "value": float(to_recorded(fit.parameters[i], parameter.unit)),
@@ -73,9 +73,9 @@ def calibration_document(fit: CampaignFit) -> dict[str, Any]:
         "covariance": covariance,
         "correlation": covariance / np.outer(sigma, sigma),
         "condition": fit.estimability.condition,
-        "redundancy": adjustment.redundancy,
-        "variance_of_unit_weight": adjustment.variance_posteriori[0],
-        "iterations": int(adjustment.iterations[0]),
+        "redundancy": solution.redundancy,
+        "variance_of_unit_weight": solution.variance_posteriori,
+        "iterations": solution.iterations,
         "rms_norm_residual_mps2": np.sqrt(np.mean(fit.norm_residuals**2)),
         "affine": affine and dict(zip(("matrix", "bias_mps2"), affine, strict=True)),
         "mended": None,

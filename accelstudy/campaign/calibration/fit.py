@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from accelstudy.adjustment import Observations, calibrate
 from accelstudy.adjustment.observations import AngleErrors
+from accelstudy.adjustment.quality import solve
 from accelstudy.approaches import Approach, get_approach
 from accelstudy.basics.errors import InputError
 from accelstudy.basics.units import MGON
@@ -142,16 +143,16 @@ def fit_campaign(
     if not adjustment.converged[0]:
         _determined(campaign, model, approach, sigma_to_show_above(campaign))
         raise InputError(f"{campaign.name}: {_cause(campaign, model, theory)}")
-    fit = CampaignFit(campaign, model, approach, observed, adjustment, theory)
+    fit = CampaignFit(campaign, solve(model, approach, observed, adjustment), theory)
     prior = model.prior_weights.any() or observed.common is not None or bool(observed.known)
-    if campaign.sigma_force is None and prior and adjustment.redundancy > 0:
+    if campaign.sigma_force is None and prior and fit.solution.redundancy > 0:
         # What is known a priori needs a sigma beside it: that of the residuals.
         for _ in range(3):
             sigma = max(fit.sigma_position_posteriori, 1e-9, least_sigma(campaign, approach))
             observed = replace(observed, sigma_force=sigma)
             adjustment = calibrate(model, approach, observed)
             if adjustment.converged[0]:
-                fit = replace(fit, observed=observed, adjustment=adjustment)
+                fit = replace(fit, solution=solve(model, approach, observed, adjustment))
     blur = sigma_to_show_above(campaign)
     if campaign.sigma_force is None and 0 <= fit.sigma_position_posteriori < LEAST_SCATTER:
         raise InputError(
@@ -159,7 +160,7 @@ def fit_campaign(
             "readings in steps that are too coarse, so nothing tells their noise; state it "
             "(sensor_noise.sigma_mps2)"
         )
-    if adjustment.redundancy > 0:
+    if fit.solution.redundancy > 0:
         # A stated noise may be too large; where residuals are larger, an effect may be missing.
         seen = fit.sigma_position
         blur = max(seen, UNIT_SIGMA) if campaign.sigma_force is None else min(seen, blur)

@@ -68,7 +68,7 @@ def check_sigmas(fit: CampaignFit, replicates: int = 2000, seed: int = 1) -> pd.
     )
     rng = np.random.default_rng(np.random.SeedSequence(seed, spawn_key=(0, 1)))
     for _, observed in drawn:
-        observed = with_angle_errors(ideal, observed, fit.observed.angle_errors, rng)
+        observed = with_angle_errors(ideal, observed, fit.solution.observed.angle_errors, rng)
         result = calibrate(model, approach, replace(observed, initial=fit.parameters))
         estimates.append(result.parameters[result.converged, : model.n_parameters])
     errors = np.concatenate(estimates) - fit.parameters

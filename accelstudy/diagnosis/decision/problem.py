@@ -77,12 +77,12 @@ class BaseFit:
     @property
     def sigma(self) -> float:
         """Sigma of the forces that the fit took, m/s²."""
-        return float(np.mean(np.asarray(self.solution.observed.sigma_force)))
+        return self.solution.sigma_force
 
     @property
     def sigma_posteriori(self) -> float:
         """Sigma of the forces by the residuals, m/s²."""
-        return self.sigma * float(np.sqrt(self.solution.omega / self.solution.redundancy))
+        return self.sigma * float(np.sqrt(self.solution.variance_posteriori))
 
 
 def fit_base(campaign: Campaign, model: SensorModel, approach: Approach) -> BaseFit:
@@ -103,7 +103,7 @@ def fit_base(campaign: Campaign, model: SensorModel, approach: Approach) -> Base
     # Without a sigma the weights of forces and angles need one: that of the residuals.
     for _ in range(1 if stated else 3):
         fit = fit_campaign(measured, model, approach)
-        if fit.adjustment.redundancy <= 0:
+        if fit.solution.redundancy <= 0:
             raise InputError(
                 f"{campaign.name}: {campaign.n_positions} positions leave no redundancy beside "
                 f"the {model.n_parameters} parameters of {model.name!r}: nothing can "
@@ -113,7 +113,7 @@ def fit_base(campaign: Campaign, model: SensorModel, approach: Approach) -> Base
             least = max(1e-9, least_sigma(campaign, approach))
             sigma = max(fit.sigma_position, least)
             measured = measured.with_sigma(sigma)
-    solution = solve(fit.model, fit.approach, fit.observed, fit.adjustment)
+    solution = fit.solution
     sd, n, within = campaign.sd, campaign.n_samples, None
     if sd is not None and n is not None and np.all(sd > 0):
         within = np.asarray(np.mean(sd**2 / n[:, None], axis=0))
@@ -124,7 +124,7 @@ def fit_base(campaign: Campaign, model: SensorModel, approach: Approach) -> Base
     most, ratio = RULES.beyond_white, fit.sigma_position_posteriori**2 / np.mean(within)
     if not 1 / most < ratio < most:
         return BaseFit(solution, Level.of_nothing_stated(), within)
-    observed = replace(fit.observed, sigma_force=float(np.sqrt(np.mean(within))))
+    observed = replace(solution.observed, sigma_force=float(np.sqrt(np.mean(within))))
     return BaseFit(solve(fit.model, fit.approach, observed), Level.of_holds(), within)
 
 

@@ -4,13 +4,12 @@ from __future__ import annotations
 
 import re
 from collections.abc import Mapping
-from dataclasses import asdict, replace
+from dataclasses import asdict
 from typing import Any
 
 import numpy as np
 import pandas as pd
 
-from accelstudy.adjustment import calibrate
 from accelstudy.adjustment.quality import Solution
 from accelstudy.basics import plugins
 from accelstudy.basics.names import MAX_NAME_BYTES
@@ -147,18 +146,9 @@ def diagnosed_fit(diagnosis: CampaignDiagnosis) -> CampaignFit:
     d = diagnosis
     bumped = d.campaign.positions[~d.used_positions].tolist()
     campaign = d.campaign.without(dict.fromkeys(bumped, "bumped, as the diagnosis found"))
-    solution = d.final.solution
-    start = solution.parameters[: d.extended_model.n_parameters]
-    observed = replace(solution.observed, initial=start)
     return CampaignFit(
         campaign=campaign,
-        model=d.extended_model,
-        approach=d.approach,
-        observed=observed,
-        # Its cofactors do not know of the settings that were searched for.
-        adjustment=replace(
-            calibrate(d.extended_model, d.approach, observed), cofactors=solution.cofactors[None]
-        ),
+        solution=d.final.solution,
         estimability=campaign_estimability(campaign, d.extended_model, d.approach),
         judgement=d.noise,
     )
