@@ -362,11 +362,6 @@ def test_columns_of_the_campaign_that_a_log_lacks_are_said_to_come_from_there(pl
     known = with_keys(plain, log=layout)
     with pytest.raises(InputError, match=r"no column 'ax'.*log of the campaign, `columns`"):
         level_log(known, log, tmp_path / "out.csv")
-    # A temperature that no effect needs may be missing, unless it is asked for.
-    layout = LogLayout(columns={"fx": "fx", "fy": "fy", "fz": "fz", "temperature": "T"})
-    known = with_keys(plain, log=layout)
-    level_log(known, log, tmp_path / "out.csv")
-    level_log(known, log, tmp_path / "out.csv", {"columns": {"temperature": "count"}})
 
 
 def test_a_reading_at_the_end_of_the_range_is_no_measurement(plain, tmp_path):

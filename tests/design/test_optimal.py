@@ -32,7 +32,6 @@ from accelstudy.sensors.models import get_model
 from accelstudy.simulation.sessions import Noise, session
 
 BY_GRAVITY, BY_ROBOT = (Task(NINE, get_approach(name)) for name in ("gravity", "robot"))
-MCLAREN = get_scheme("mclaren-24").directions
 SEARCHED = 1e-3
 """Relative margin by which a search may find a variance that is smaller than a stored one."""
 
@@ -83,14 +82,6 @@ def test_the_i_criterion_is_the_tilt_error_of_linear_theory(approach):
     np.testing.assert_allclose(rms_tilt(task, scheme.directions), rms, rtol=1e-9)
     value = get_criterion("I", task).value(task.normal(scheme.directions))
     assert float(np.exp(value)) == pytest.approx(np.mean(rms**2), rel=1e-9)
-
-
-def test_observed_gravity_is_prior_information():
-    task = Task(NINE, GRAVITY, Noise(sigma_gravity=1e-5))
-    assert task.names[-1] == "g"
-    found = np.linalg.norm(task.information(MCLAREN).errors(range(10)), axis=1)
-    assert found[-1] == pytest.approx(1e-5, rel=1e-2)  # positions tell nothing beside scales
-    np.testing.assert_allclose(rms_tilt(task, MCLAREN), rms_tilt(BY_GRAVITY, MCLAREN), rtol=1e-3)
 
 
 @pytest.mark.parametrize("name", ["D", "A", "I", "minimax"])

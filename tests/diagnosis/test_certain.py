@@ -45,32 +45,6 @@ def test_a_warm_up_is_certain_whatever_is_open_beside_it():
     assert "The model lacks warm up, and" in verdict_lines(found)[0]
 
 
-def with_ramp(campaign, first, last):
-    """The session with a temperature that rises between two holds, and its rate in each of them."""
-    n = len(campaign.forces)
-    temperature = np.interp(np.arange(n), [first, last], [20.0, 40.0])
-    inside = (np.arange(n) > first) & (np.arange(n) < last)
-    return campaign.with_arrays(temperature=temperature), np.where(inside, 1.0, 0.0)
-
-
-@pytest.mark.parametrize("approach", ["gravity", "robot"])
-def test_what_a_rate_of_temperature_does_is_no_bumped_position(approach):
-    for seed in range(2):
-        rng = np.random.default_rng([23, seed])
-        campaign, _ = session(36, rng, approach)
-        campaign, rate = with_ramp(campaign, 14, 18)
-        bias = rng.standard_normal(3)
-        bias *= 0.03 / np.linalg.norm(bias)
-        forces = campaign.forces + np.outer(rate, bias) + 1e-3 * rng.standard_normal((36, 3))
-        found = diagnose(campaign.with_arrays(forces=forces), NINE)
-        assert found.verdict in ("unknown", "learned")
-        assert found.credible_set[0].names[-1] == "unknown"
-        # By gravity the three holds of the ramp have one condition each, for a bias as for angles.
-        assert found.place is None or found.place[0] == "dT/dt"
-        if approach == "robot":
-            assert found.place in (None, ("dT/dt", "bias"))
-
-
 SPOILS = {
     "hand-placed": lambda forces, rng: forces + 0.3 * rng.standard_normal(forces.shape),
     "hysteresis": lambda forces, _: (

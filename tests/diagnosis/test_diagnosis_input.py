@@ -98,16 +98,6 @@ def test_no_effect_is_silently_absent(gravity):
         assert all(seen.untestable.values())
 
 
-def test_counts_that_are_coarse_are_named_as_such(robot, tmp_path):
-    """0.0236 m/s² a count and 0.002 m/s² of noise: the step is found as it is."""
-    nominal = {"scale": [0.0236] * 3, "offset": [33000.0] * 3}
-    counts = robot.with_header(unit="counts", nominal=nominal)
-    whole = {f: lambda t, f=f: t[f].round() for f in ("fx", "fy", "fz")}
-    found, _ = document(tmp_path, counts, lambda t: t.assign(**whole))
-    assert found["effects"][0]["name"] == "quantisation"
-    assert "23.60 mm/s²" in found["reason"]
-
-
 @pytest.mark.parametrize(("repeat_first", "sigma_angle"), [(0, 0.0), (1, 1e-9)])
 def test_one_repeat_or_none_is_enough_and_no_robot_too_good(repeat_first, sigma_angle):
     measured = campaign(repeat_first=repeat_first)

@@ -35,7 +35,6 @@ from accelstudy.diagnosis.result import CampaignDiagnosis
 from accelstudy.diagnosis.rules import RULES
 from accelstudy.diagnosis.space.frame import SessionFit
 from accelstudy.leveling.error import cap_forces, holds_in_use
-from accelstudy.sensors.models import get_model
 from accelstudy.simulation.sessions import Noise, session
 
 THERMAL = "thermal_bias: 0.003, -0.002, 0.001"
@@ -255,14 +254,6 @@ def test_a_bumped_position_is_left_out(tmp_path):
     assert np.flatnonzero(positions["residual_x_after_mps2"].isna()).tolist() == [7]
 
 
-@pytest.mark.parametrize("case", ["named", "gravity", "noise_model"])
-def test_the_model_is_one_for_every_command(written, case):
-    one = written(case)
-    model = get_model(str(one.folder / "model.yaml"))
-    specs = [effect["spec"] for effect in one.content["effects"] if effect["parameters"]]
-    assert [effect.spec for effect in model.effects[3:]] == specs
-
-
 def simulated_sessions(simulated, fitted, d, count=200):
     """Variances of unit weight and tilt errors of sessions, each drawn and calibrated."""
     p = simulated.parameters[: simulated.model.n_parameters]
@@ -303,16 +294,6 @@ def test_simulations_find_what_is_said_of_them(named, written, tmp_path):
     page = (tmp_path / "deg/report.html").read_text("utf-8").partition("90° = 100 gon")[2]
     assert f"Tilt error left: {number(0.9 * tilt.before / MGON)} mdeg" in page
     assert re.findall(r"(?:[^.\w]|m)gon", page) == []
-
-
-@pytest.mark.usefixtures("composed")
-def test_positions_that_are_just_enough_to_calibrate_show_nothing(tmp_path):
-    diagnosis = diagnose(acs.simulate_campaign(scheme="d-optimal-10", approach="gravity"), NINE)
-    assert diagnosis.base.redundancy == 1
-    write_diagnosis(diagnosis, tmp_path)
-    page = (tmp_path / "report.html").read_text(encoding="utf-8")
-    assert "Too few positions to show whether anything is missing" in page
-    assert page.count("<svg") == 1  # that of the residuals
 
 
 @pytest.mark.usefixtures("composed")

@@ -49,16 +49,11 @@ def test_the_full_study():
     cases = [case for case, _ in config.campaigns()]
     null = [case for case in cases if case.set == "null"]
     assert len(null) >= 12000
-    assert len({case.design for case in null}) >= 8
     assert len({*null}) == len(config.places)
     counts = Counter((case.what, case.size) for case in cases if case.set == "one")
     assert set(counts.values()) == {30}
-    assert {size for _, size in counts} == {6, 10.5, 16, 25, 40, 60, 100, 400}
-    # Those that have a formula of their own for this study; gravity_error is invisible everywhere.
-    visible = {*KINDS["one"][0]} - {"gravity_error"}
-    assert len(visible) >= 23
-    assert {what for what, _ in counts} >= visible
-    assert len({case.name for case in cases}) == len({*cases})
+    # gravity_error is invisible everywhere.
+    assert {what for what, _ in counts} >= {*KINDS["one"][0]} - {"gravity_error"}
 
 
 # --- campaigns and seeds --------------------------------------------------------------------------

@@ -1,13 +1,10 @@
 """Effects in public logs: what is put in is what was meant, and answers are judged by it."""
 
-import re
-
 import numpy as np
 import pandas as pd
 import pytest
 from places import ROOT
 from scipy import optimize, stats
-from snakemake_helpers import snakemake
 
 from accelstudy.campaign.importing.logs import import_log
 from accelstudy.campaign.importing.settings import ImportSettings
@@ -17,7 +14,6 @@ from studies.hidden.physics.kinds import EFFECTS, Cause
 from studies.hidden.real_logs import BUMPED, PUT, Donor, LogCase
 from studies.hidden.real_noise import RealNoiseConfig
 from studies.hidden.scoring.judging import judge
-from studies.hidden.scoring.page import frames, score_page
 
 G, SIZE, COUNT, SIGMA = 9.80665, 20, 26, 0.01
 CONFIG = parse_hidden(read_layer(ROOT / "studies/hidden/config/real-noise.yaml"))
@@ -31,9 +27,6 @@ OURS = RealNoiseConfig(
     effects=["quadratic_scale", BUMPED, "thermal_bias", "quadratic_scale+bias_drift"],
     nothing=2,
 )
-
-
-ORIGIN = {"seed": 3, "version": "0", "commit": "0" * 10}
 
 
 @pytest.fixture(scope="module")
@@ -118,20 +111,6 @@ def test_plain_effects_in_white_noise_are_found(table):
     assert said[f"{NAME}/thermal_bias/300/not recorded"] != "right name"
 
 
-def test_the_page_counts_every_campaign_once(campaigns):
-    judged = frames(campaigns, OURS)
-    page = score_page(OURS, judged, ORIGIN)
-    part = page.partition("## Each effect")[2].partition("##")[0]
-    rows = [line.split("|")[1:-1] for line in part.splitlines() if line.startswith("| ")][2:]
-    assert (
-        sum(int(n) for *_, n, _, _, _, _, _, _, _, _, _ in rows)
-        == (judged["campaigns"]["set"] != "null").sum()
-    )
-    for *_, n, a, b, c, d, e, f, g, h, _ in rows:
-        assert sum(map(int, (a, b, c, d, e, f, g, h))) == int(n)
-    assert page.count(f"| {NAME} | nothing is missing | 2 |") == 1
-
-
 def said(
     row, verdict, found=(), true=("thermal_bias",), recorded=True, explanations=(), own=(), **more
 ):
@@ -174,12 +153,3 @@ def test_what_an_answer_says(campaigns, expected, given):
 def test_where_the_logs_are_changes_no_number():
     moved = CONFIG.model_copy(update={"public_folder": "elsewhere"})
     assert moved.fingerprint == CONFIG.fingerprint
-
-
-def test_the_workflow_makes_each_log_and_the_score(tmp_path):
-    words = ["--snakefile", ROOT / "studies/hidden/hidden.smk", "--dry-run"]
-    given = ["--configfile", ROOT / "studies/hidden/config/real-noise.yaml"]
-    text = snakemake(tmp_path, *words, *given).stdout
-    assert re.search(rf"hidden_diagnose +{len(CONFIG.logs)}\n", text)
-    assert re.search(r"hidden_score +1\n", text)
-    assert "name a study: --configfile" in snakemake(tmp_path, *words).stdout

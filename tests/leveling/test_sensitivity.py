@@ -64,13 +64,6 @@ def test_forces_alone(roll, pitch):
     assert sd["roll"] == pytest.approx(12.98 / np.cos(theta), rel=0.01)
 
 
-def test_the_table_is_the_grid():
-    table = leveling_sensitivity([0, -10], [5, 0, 50], 0.002, 16, 1)
-    assert len(table) == 2 * 3 * 2 * 3
-    attitudes = table[["roll_gon", "pitch_gon"]].drop_duplicates().to_numpy().tolist()
-    assert attitudes == [[0, 5], [0, 0], [0, 50], [-10, 5], [-10, 0], [-10, 50]]
-
-
 # --- with the parameters of a calibration (figures 5 and 6) --------------------------------------
 
 SIGMA = np.repeat([0.70711e-3, 101.97e-6, 10.264 * MGON], 3)

@@ -16,7 +16,7 @@ from accelstudy.campaign.calibration.export import export
 from accelstudy.campaign.calibration.fit import fit_campaign
 from accelstudy.campaign.calibration.sensor_calibration import read_calibration
 from accelstudy.diagnosis.pipeline import diagnose
-from accelstudy.diagnosis.report.document import diagnosed_calibration, model_file
+from accelstudy.diagnosis.report.document import diagnosed_calibration
 from accelstudy.sensors.frames import parse_frame
 from accelstudy.sensors.models import get_model
 
@@ -180,13 +180,6 @@ def test_the_rig_stays_where_it_was(tmp_path):
     )
     assert content["affine"] is not None
     assert len(export(read_calibration(path), "matrix")[0].splitlines()) == 3
-
-
-def test_a_model_that_becomes_a_registered_one_has_a_file_too():
-    campaign = acs.simulate_campaign(scheme="fibonacci-30")
-    diagnosis = diagnose(campaign, get_model("bias-scale"))
-    assert diagnosis.extended_model.name == NINE
-    assert model_file(diagnosis) == {"models": {"extended": ["bias", "scale", "nonorthogonality"]}}
 
 
 def test_a_large_effect_is_fitted_from_the_affine_part_on():

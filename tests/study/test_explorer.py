@@ -268,17 +268,6 @@ def test_a_choice_leaves_its_set_ups_and_shows_their_numbers(shown, tables):
     assert f"(in the tables {robot}): 40 of 40 converged" in shown.locator("#chosen").inner_text()
 
 
-def test_a_click_on_a_point_chooses_its_set_up(shown, tables):
-    shown.get_by_text("Show All").click()
-    choose(shown, "gravity")
-    choose(shown, model_title(NINE))
-    count(shown, 4)
-    mark = "#charts [aria-label*='12 icosahedron'][aria-roledescription=point]"
-    shown.locator(f"{mark}:not([opacity='0'])").first.click(force=True)
-    assert "12 icosahedron" in shown.locator("#chosen").inner_text()
-    assert "12 icosahedron" in shown.locator("#setups tr.selected").inner_text()
-
-
 def test_what_is_chosen_is_a_part_of_the_address(shown, tables):
     shown.get_by_text("Show All").click()
     choose(shown, "robot")
@@ -300,11 +289,3 @@ def test_what_is_chosen_is_a_part_of_the_address(shown, tables):
 def test_names_are_no_markup(tab, folder):
     load(tab, (folder / "other.html").as_uri())
     assert rows(tab)["model"][0].startswith("<b>mine</b>")
-
-
-def test_a_narrow_screen(tab, written):
-    tab.set_viewport_size({"width": 390, "height": 800})
-    load(tab, written.as_uri())
-    assert tab.evaluate("document.documentElement.scrollWidth") <= 390
-    assert tab.locator("#charts svg").bounding_box()["width"] <= 390
-    tab.set_viewport_size({"width": 1280, "height": 900})

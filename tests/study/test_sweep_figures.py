@@ -55,23 +55,6 @@ def test_both_approaches_are_drawn_where_no_factor_has_its_default(factorial):
     assert at["value"].iloc[0] == pytest.approx(rows["sd_empirical"].mean(), rel=1e-12)
 
 
-def test_the_head_names_model_and_held_values_and_the_legend_lies_within(factorial):
-    study, tables = factorial
-    drawn = draw("sweep-robot-noise", tables, study)
-    assert drawn.axes[0].get_title() == "9: + non-orthogonality\nsensor noise 1 mm/s² (one of 2)"
-    assert drawn.axes[-1].get_xlabel() == "robot noise $\\sigma_r$ / mgon"
-    assert [ax.get_ylabel() for ax in drawn.axes][::4] == [
-        "bias\nsd / mm/s²",
-        "pitch error\nrms / mgon",
-    ]
-    drawn.draw_without_rendering()
-    box, page = drawn.legends[0].get_window_extent(), drawn.bbox
-    assert page.x0 <= box.x0 < box.x1 <= page.x1
-    assert page.y0 <= box.y0 < box.y1 <= page.y1
-    (title,) = {ax.get_title() for ax in draw("sweep-sensor-noise", tables, study).axes} - {""}
-    assert title.endswith("robot noise 5 mgon (one of 3)")
-
-
 def test_the_unit_of_the_user_holds_where_the_study_names_none(monkeypatch):
     study = study_of(grid())
     monkeypatch.setenv("ACCELSTUDY_ANGLE_UNIT", "deg")

@@ -223,13 +223,6 @@ def test_one_figure_is_drawn_alone(finished):
     assert [path.name for path in folder.iterdir()] == ["leveling-overview.png"]
 
 
-def test_with_one_model_schemes_fan_out(tmp_path):
-    config = {**TINY, "grids": [{**TINY["grids"][0], "models": MODELS[0]}]}
-    assert jobs(succeed(tmp_path, "--dry-run", config=config))["simulate"] == 4
-    one = f"results/tiny/estimates/{MODELS[0]}/faces-6/robot.parquet"
-    assert jobs(succeed(tmp_path, "--dry-run", one, config=config)) == {"simulate": 1}
-
-
 # --- bad input -----------------------------------------------------------------------------------
 
 

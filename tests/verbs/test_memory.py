@@ -12,8 +12,6 @@ from calling import succeed
 from study_helpers import grid, run_study
 
 import accelstudy as acs
-from accelstudy.basics.arguments import quantity
-from accelstudy.basics.units import UNITS, InputQuantity
 from accelstudy.files.tables import read_table
 from accelstudy.schemes import get_scheme
 
@@ -82,16 +80,6 @@ def test_tables_files_and_the_command_are_leveled_alike(calibration, table, tmp_
     assert len(of_table[~of_table["near_pole"]]) == len(table) - 1
     (warning,) = of_table.attrs["warnings"]
     assert "row 4, column fx" in warning
-
-
-@pytest.mark.parametrize("unit", UNITS)
-def test_a_quantity_is_a_number_in_si_or_a_text_with_its_unit(unit):
-    """Also where the unit begins with a digit, as 1/K does."""
-    given = InputQuantity(unit, -np.inf)
-    for number in (0.25, 2e-4, -3, np.float64(1e-9)):
-        assert quantity("x", number, given) == number
-    for name, size in UNITS[unit].items():
-        assert quantity("x", f"2 {name}", given) == 2 * size
 
 
 # --- studies -------------------------------------------------------------------------------------
