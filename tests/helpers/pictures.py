@@ -3,14 +3,12 @@
     python tests/helpers/pictures.py          # make the pictures of reports and studies anew
     python tests/helpers/pictures.py check    # compare the small study with what stands there
 
-docs/figures/shown.json knows what a reader sees on each picture: the words and numbers of a report,
-the texts of a figure and where its lines are. It has a hash of the words, and the numbers. Figures
-of a study are compared by those of the small study, which CI runs anyway.
+tests/golden/pictures has what a reader sees on each picture: the text of a report, the texts of a
+figure and where its lines are. Figures of a study are compared by those of the small study, which
+CI runs anyway.
 """
 
 import contextlib
-import hashlib
-import json
 import re
 import shutil
 import subprocess
@@ -20,15 +18,15 @@ from pathlib import Path
 
 import numpy as np
 from example_helpers import FIGURES, run_example
-from page_helpers import NUMBER, numbers, text_of
+from golden import GOLDEN, compare, kept_of
 from PIL import Image, ImageChops
 from places import ROOT
 from playwright.sync_api import sync_playwright
+from transcript import figure_text, page_text
 
 import accelstudy as acs
 
 PICTURES = ROOT / "docs" / "figures"
-KEPT = PICTURES / "shown.json"
 PAPER, SMALL = ROOT / "results" / "paper", ROOT / "results" / "smoke"
 MADE_BY = "make pictures"
 
@@ -45,26 +43,6 @@ OF_STUDIES = {
 """Pictures of the pages of a study."""
 
 
-def difference(kept, text):
-    """How a text differs from that of a fingerprint; empty if only the rounding of numbers does."""
-    (words, *before), (others, *after) = kept.split(), fingerprint(text).split()
-    if words != others:
-        return "other words"
-    for one, other in zip(before, after, strict=True):
-        if not np.isclose(float(one), float(other), rtol=2e-3, atol=0.011):
-            return f"{other} instead of {one}"
-    return ""
-
-
-def fingerprint(text):
-    """What is kept of a text: a hash of its words, and its numbers."""
-    return " ".join([hashed(NUMBER.sub("#", text)), *(f"{n:.12g}" for n in numbers(text))])
-
-
-def hashed(text):
-    return hashlib.sha256(text.encode()).hexdigest()[:16]
-
-
 def same_picture(one, other):
     """Whether two pictures look the same: hardly a point differs by more than a shade."""
     pair = [Image.open(path).convert("L") for path in (one, other)]
@@ -77,10 +55,9 @@ def seen(path):
     """What a reader sees of a page (HTML) or of a figure (SVG)."""
     text = path.read_text(encoding="utf-8")
     if path.suffix == ".html":
-        return text_of(re.sub(r"<script\b.*?</script>", "", text, flags=re.DOTALL))
-    texts = re.findall(r"<!-- (.*?) -->", text)
+        return page_text(text)
     parts = re.split(r'<g id="axes_\d+">', re.sub(r"<defs>.*?</defs>", "", text, flags=re.DOTALL))
-    return "; ".join([*texts, *map(_drawn, parts[1:])])
+    return "\n".join([figure_text(text), *map(_drawn, parts[1:])])
 
 
 def _drawn(axes):
@@ -108,23 +85,17 @@ def overview(log, hidden, folder):
     return folder / "batch/report.html"
 
 
-def kept():
-    return json.loads(KEPT.read_text(encoding="utf-8"))
-
-
-def keep(fingerprints):
+def keep(shown):
     """Take note of what pictures show that were made anew."""
-    content = {**kept(), **fingerprints}
-    KEPT.write_text(
-        json.dumps(content, indent=1, sort_keys=True, ensure_ascii=False) + "\n", "utf-8"
-    )
+    for name, text in shown.items():
+        (GOLDEN / "pictures" / f"{name}.txt").write_text(f"{text}\n", encoding="utf-8")
 
 
 def stale(now):
-    """Pictures that show something else than now, and what: ``report (3.2 instead of 3.1)``."""
-    stored = kept()
-    differences = {name: difference(stored.get(name, "-"), text) for name, text in now.items()}
-    return [f"{name} ({said})" for name, said in differences.items() if said]
+    """Pictures that show something else than now, each with the first line that differs."""
+    before = kept_of("pictures")
+    found = {name: compare(before.get(name, ""), text)[0] for name, text in now.items()}
+    return [f"{name}, line {lines[0]}" for name, lines in found.items() if lines]
 
 
 def photograph(browser, page, picture, size):
@@ -170,7 +141,7 @@ def make_anew():
     subprocess.run(["snakemake", "--cores", "2", *drawn], cwd=ROOT, check=True)
     for path in drawn:
         shrink(ROOT / path, PICTURES / Path(path).name)
-    keep({name: fingerprint(text) for name, text in (texts | of_study(SMALL)).items()})
+    keep(texts | of_study(SMALL))
 
 
 def main(*arguments):
