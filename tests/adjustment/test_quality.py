@@ -234,16 +234,3 @@ def test_the_external_reliability_is_what_such_an_error_does():
     angles = [np.stack(roll_pitch(tuple(f.T))) for f in (NINE.correct(output, moved), f_b)]
     rms = np.sqrt(np.mean((angles[0] - angles[1]) ** 2, axis=1))
     np.testing.assert_allclose(rms, found.leveling[position], rtol=0.01)
-
-
-def test_no_error_of_the_robot_in_the_ellipsoid_does_more():
-    solution = solve(NINE, ROBOT, draw(2))
-    found, position = reliability(solution), 3
-    root = solution.whitening[position] @ solution.root[0][position]
-    directions = np.random.default_rng(0).standard_normal((2000, 3))
-    directions /= np.linalg.norm(directions, axis=1, keepdims=True)
-    shifts = math.sqrt(noncentrality(3)) * directions @ root.T
-    size = np.linalg.norm(shifts, axis=1)
-    low, high = found.mdb[position, [0, -1]]
-    assert low * (1 - 1e-9) <= size.min() < 1.05 * low
-    assert 0.95 * high < size.max() <= high * (1 + 1e-9)

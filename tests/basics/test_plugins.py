@@ -103,14 +103,6 @@ def test_a_model_in_a_file_names_it_and_loads_nothing(named):
     assert get_model("model.yaml").effects[1].name == "ripple"
 
 
-def test_a_new_study_names_those_it_was_set_up_with():
-    with forgotten():
-        succeed("init", "new", "--plugin", "ripple.py")
-    content = yaml.safe_load(Path("new/config/config.yaml").read_text(encoding="utf-8"))
-    plugins.load_plugins(content)
-    assert plugins.loaded_files() == [str(Path("ripple.py").resolve())]
-
-
 def test_jobs_load_it_and_run_again_when_it_changes(tmp_path):
     table = "results/mine/tables/bias-scale+ripple(period=8)/fibonacci-24/gravity/summary.parquet"
 

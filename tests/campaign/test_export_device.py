@@ -269,20 +269,6 @@ def written(folder, model, **changes):
     return path
 
 
-@pytest.mark.parametrize("form", ["c", "px4"])
-@pytest.mark.parametrize(("spec", "what"), [
-    ("hysteresis", "position before"),
-    ("settling", "position before"),
-    ("learned(coordinate=previous, low=-10, high=10)", "position before"),
-    ("learned(coordinate=yaw)", "yaw"),
-    ("learned(coordinate=order, low=1, high=30)", "order"),
-])  # fmt: skip
-def test_what_no_device_knows_is_refused(form, spec, what):
-    effect = get_effect(spec).name
-    with refused(f"{effect} depends on the {what}, which no device knows"):
-        export(calibration_with((spec,)), form)
-
-
 INJECTED = "x\n1\t1\tCAL_ACC0_XOFF\t9\t9\x1b[31m\u2028*/"
 
 

@@ -168,15 +168,6 @@ def test_what_does_not_show_is_not_recognised(designs):
         assert recognise(spoiled, attitude=False) is None
 
 
-def test_a_sensor_that_is_mounted_in_its_own_way_is_no_gross_error(designs):
-    angle = np.pi / 6
-    c, s = np.cos(angle), np.sin(angle)
-    for design in ("turned", "plain"):
-        right = designs[design]
-        turned = right.forces @ np.array([[c, s, 0], [-s, c, 0], [0, 0, 1]])
-        assert recognise(right.with_arrays(forces=turned)) is None
-
-
 def test_several_gross_errors_are_undone_together(designs):
     right = designs["many"]
     wrong = gross.bumped(exchanged(right, [4, 9], [9, 4]), 21, (3, -12, 8))

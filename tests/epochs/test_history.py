@@ -1,10 +1,7 @@
 """Rates and scatters of a sensor beside simulated ones, and what the command writes."""
 
-import json
-
 import numpy as np
 import pytest
-from calling import succeed
 from page_helpers import assert_sound
 from session_helpers import SENSOR, write_document
 
@@ -118,21 +115,15 @@ def calibrations(folder, biases):
         yield folder / f"{k}.json"
 
 
-def arguments(paths, dates=YEARS):
-    return [*paths, *(f"--date={date}" for date in dates)]
-
-
 @pytest.mark.usefixtures("composed")
 @pytest.mark.parametrize("per_year", [0.0, 0.02])
-def test_the_command_writes_what_it_says(per_year, tmp_path):
+def test_a_drift_is_found_and_shortens_the_interval(per_year, tmp_path):
     """Calibrations come in any order."""
     paths = list(calibrations(tmp_path, [0.1 + per_year * k / 2 for k in range(5)]))
-    out = tmp_path / "out"
-    given = arguments(paths[::-1], YEARS[::-1])
-    told = succeed("history", *given, "--out", out, "--tilt-accuracy", "60mgon").stdout
-    content = json.loads((out / "history.json").read_text(encoding="utf-8"))
-    assert content["state"] == ("changed" if per_year else "unchanged")
-    assert told.startswith(f"{content['state'].upper()}: {content['verdict']}")
+    history = acs.history(paths[::-1], dates=YEARS[::-1], tilt_accuracy="60 mgon")
+    history.save(tmp_path / "out")
+    content = history.content
+    assert history.state == ("changed" if per_year else "unchanged")
     assert [p["found"] for p in content["parameters"] if p["found"]] == [["drifts"]] * bool(
         per_year
     )
@@ -140,12 +131,8 @@ def test_the_command_writes_what_it_says(per_year, tmp_path):
     assert low < per_year < high
     assert [c["campaign"] for c in content["calibrations"]] == [f"session-{k}" for k in range(1, 6)]
     # A drift of 20 mm/s² a year tilts by 130 mgon.
-    assert content["interval"]["until"] in told
     assert (content["interval"]["years"] < 0.5) == bool(per_year)
-    assert {len(p[key]) for p in content["parameters"] for key in ("values", "sigmas")} == {5}
-    page = (out / "report.html").read_text(encoding="utf-8")
-    assert_sound(page)
-    assert (out / "figures/history.svg").is_file()
+    assert_sound((tmp_path / "out/report.html").read_text(encoding="utf-8"))
 
 
 def test_dates_come_from_the_campaigns(tmp_path):

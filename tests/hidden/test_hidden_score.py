@@ -175,10 +175,8 @@ def targets(judged):
     # A bumped hold is recognised where it is.
     ("recognised", "gross errors", "1.00", 2 / 4, 4, "no"),
     # What explains the targets.
-    ("names in a 90 % set beyond the oracle's", "one effect, λ = 25", "", 1 / 3, 3, ""),
     ("named, and wrong, as the posteriors expect", "one and two effects", "", 0.2, 6, ""),
     ("named, and wrong", "posterior from 0.85 on", "", np.nan, 0, ""),
-    ("learned", "outside the catalogue, without a place, λ ≥ 150", "", 1 / 2, 2, ""),
 ])  # fmt: skip
 def test_targets(targets, figure, cases, wanted, measured, n, met):
     (row,) = [r for r in targets if (r["figure"], r["campaigns"]) == (figure, cases)]

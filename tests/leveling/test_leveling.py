@@ -69,14 +69,6 @@ def test_sigma_of_equal_noise(roll, pitch, sigma):
     np.testing.assert_allclose(found, [sigma / (G * np.cos(pitch)), sigma / G], rtol=1e-9)
 
 
-def test_sigma_of_correlated_noise_by_simulation():
-    cov = np.array([[4.0, 1.5, -1.0], [1.5, 3.0, 0.5], [-1.0, 0.5, 2.0]]) * 1e-6
-    f = force(35 * GON, -40 * GON)
-    draws = np.random.default_rng(7).multivariate_normal(f, cov, size=40_000)
-    spread = np.std(roll_pitch(tuple(draws.T)), axis=1)
-    np.testing.assert_allclose(sigma_roll_pitch(f, cov), spread, rtol=4.5 / np.sqrt(2 * 40_000))
-
-
 @pytest.mark.parametrize(
     "noise", [(1, 1, 1), (1, 3, 1), (1, 10, 1), (1, 1, 10), (10, 1, 1), (0.1, 1, 0.3)]
 )

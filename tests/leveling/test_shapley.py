@@ -60,7 +60,6 @@ def test_the_definition():
 
 
 def test_independent_groups_are_games_of_their_own():
-    """What a group has as a whole is its share of the variance, in whatever coordinates."""
     order = [3, 0, 5, 1, 4, 2]  # so that no group is in one piece
     blocks = [random_covariance(2, 2), random_covariance(4, 3)]
     slope = np.random.default_rng(4).normal(size=6)
@@ -71,10 +70,6 @@ def test_independent_groups_are_games_of_their_own():
     for part, block in zip((slice(0, 2), slice(2, 6)), blocks, strict=True):
         alone, its = linear_shapley(slope[part], block)
         np.testing.assert_allclose(shares[part], alone[0] * its / variance)
-        turned = np.random.default_rng(5).normal(size=block.shape)
-        mixed, _ = linear_shapley(np.linalg.solve(turned.T, slope[part]), turned @ block @ turned.T)
-        assert mixed.sum() == pytest.approx(1)
-        assert np.abs(mixed - alone).max() > 0.01
     # One group of all, connected by a correlation that is as good as none.
     whole[0, 5] = whole[5, 0] = 1e-13
     np.testing.assert_allclose(linear_shapley(slope, whole)[0][0], shares, rtol=1e-9)

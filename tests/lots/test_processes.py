@@ -4,11 +4,8 @@ import os
 import signal
 import subprocess
 import sys
-from multiprocessing import active_children
 
 import pytest
-
-from accelstudy.lots.lot import _processes
 
 pytestmark = pytest.mark.skipif(sys.platform != "linux", reason="elsewhere there is one process")
 
@@ -78,11 +75,3 @@ def test_a_worker_does_not_answer_to_signals_as_the_program_does():
         "handled",
     ]
     assert not program.stderr
-
-
-def test_there_are_no_more_processes_than_campaigns():
-    before = set(active_children())
-    with _processes(200, 3) as mapped:
-        assert list(mapped(abs, [-1, -2, -3])) == [1, 2, 3]
-        assert len(set(active_children()) - before) == 3
-    assert not set(active_children()) - before

@@ -367,9 +367,8 @@ ASKED = ("plan", "--tilt-accuracy", "20mgon", "--sigma", "2mm/s2", "--replicates
 
 def test_the_command_writes_what_it_says(tmp_path):
     out = tmp_path / "plan"
-    asked = (*ASKED, "--equipment", "gravity", "--out")
-    result = succeed(*asked, out, "--angle-unit", "deg")
-    assert result.stdout.startswith("Measure ")
+    said = succeed(*ASKED, "--equipment", "gravity", "--out", out, "--angle-unit", "deg").stdout
+    assert said.startswith("Measure ")
     names = {path.name for path in out.iterdir()}
     assert names == {"plan.json", "positions.yaml", "plan.svg", "plan.png"}
     plan = PlanDocument.read(out).model_dump()
@@ -379,9 +378,6 @@ def test_the_command_writes_what_it_says(tmp_path):
     assert (table["roll_rms_mgon"] <= 20.5).all()
     assert plan["seed"] == 1
     assert get_scheme(str(out / "positions.yaml")).n_positions == top["n_positions"]
-    again = succeed(*asked, out, "--quiet")
-    assert len(again.stdout.splitlines()) < 10
-    assert again.stderr == ""
 
 
 def test_an_unreachable_target_has_an_exit_status_of_its_own():

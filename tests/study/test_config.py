@@ -98,8 +98,6 @@ def test_config_yaml_has_every_top_level_key():
 
 # --- bad input: what any file may have, tests/basics have -----------------------------------------
 
-SENSITIVITY = {"roll_gon": [0, 50], "pitch_gon": [0, 50], "base_samples": 16}
-
 
 def test_overlaid_files_are_all_named(tmp_path):
     over = tmp_path / "over.yaml"
@@ -125,14 +123,9 @@ def test_one_may_stand_for_a_list():
 
 
 def test_names_become_the_things_that_they_name():
-    own = {"mine": ["scale", "bias"]}
-    both = grid(["mine", NINE], ["faces-6"], approaches="all")
-    settings = {**SENSITIVITY, "model": "mine"}
-    used = grid("mine")
     study = make_study(
-        models=own,
-        grids=[both, used],
-        sensitivity=settings,
+        models={"mine": ["scale", "bias"]},
+        grids=[grid(["mine", NINE], ["faces-6"], approaches="all")],
         noise={"effects": ["heavy_tails( nu=5 )"]},
     )
     mine = study.models["mine"]
@@ -140,11 +133,10 @@ def test_names_become_the_things_that_they_name():
     assert study.grids[0].models == [mine, get_model(NINE)]
     assert study.grids[0].schemes == [get_scheme("faces-6")]
     assert study.grids[0].approaches == [get_approach(name) for name in approach_names()]
-    assert study.sensitivity.model is mine
     assert study.noise.effects == [get_noise_effect("heavy_tails(nu=5)")]
     # Nobody else's configuration has that model.
     with pytest.raises(InputError, match=r"grids\.0\.models: unknown model 'mine'"):
-        make_study(grids=[used])
+        make_study(grids=[grid("mine")])
 
 
 def test_numbers_as_yaml_1_1_reads_them():

@@ -5,15 +5,11 @@ Limits of single statistics are 4.5 standard errors.
 
 import numpy as np
 import pytest
-from closed_forms import gravity_sigma, perfect_robot_ratio
 from scipy.special import gammaln
 from scipy.stats import binom
 from study_helpers import NINE, grid, run_study
 from usual import STANDARD_ERRORS
 
-from accelstudy.basics.units import MGON
-from accelstudy.effects import get_effect
-from accelstudy.schemes import get_scheme
 from accelstudy.study.estimate import Estimates
 from accelstudy.study.tables import coverage_columns
 
@@ -50,28 +46,6 @@ def mean_of_chi(r):
 
 
 # --- accuracy ------------------------------------------------------------------------------------
-
-
-def test_sds_are_those_of_the_closed_forms(summary):
-    """Of gravity in octahedral schemes, and of the perfect robot."""
-    limit = STANDARD_ERRORS / np.sqrt(2 * (REPLICATES - 1))
-    for scheme in SCHEMES[:4]:
-        directions = get_scheme(scheme).directions
-        sigma = gravity_sigma(directions, 0.002)
-        factors = {"": sigma}
-        if scheme == "mclaren-24":
-            ratio = perfect_robot_ratio(directions)
-            factors["robot_sigma_mgon=0"] = {name: sigma[name] * ratio[name] for name in sigma}
-        for more, expected in factors.items():
-            approach = f"robot/{more}" if more else "gravity"
-            rows = of(summary, f"{NINE}/{scheme}/{approach}")
-            units = {"bias": 1e3, "scale": 1e6, "nonorthogonality": 1 / MGON}
-            for effect, unit in units.items():
-                names = [parameter.name for parameter in get_effect(effect).parameters]
-                sds = rows.loc[names, ["sd_empirical", "sd_linear"]]
-                assert (sds["sd_empirical"] / (expected[effect] * unit) - 1).abs().max() < limit
-                # The true parameters, up to 0.5 % of g, are all that linear theory adds.
-                np.testing.assert_allclose(sds["sd_linear"], expected[effect] * unit, rtol=0.01)
 
 
 def test_sds_are_those_of_linear_theory(summary):

@@ -118,8 +118,6 @@ def test_a_simulation_is_a_result_with_the_tables_of_a_study(tmp_path):
     said = json.loads((tmp_path / "simulated/simulation.json").read_text(encoding="utf-8"))
     assert (said["state"], said["verdict"]) == (result.state, result.verdict)
     result.save(tmp_path / "simulated")  # the same again takes no `force`
-    with pytest.raises(acs.InputError, match="is the folder of a simulation"):
-        acs.calibrate(acs.simulate_campaign()).save(tmp_path / "simulated", force=True)
     # The tables of a study have the same names, and are no simulation to write over.
     (tmp_path / "simulated/simulation.json").unlink()
     with pytest.raises(acs.InputError, match="is not empty"):

@@ -26,7 +26,6 @@ from accelstudy.schemes import get_scheme
 matplotlib.use("agg")
 BIAS = (0.05, 0.01, 0.03)
 HOW = {"rate": 100, "columns": {"fx": "ax", "fy": "ay", "fz": "az"}}
-WORDS = ("--rate", 100, "--columns", "fx=ax,fy=ay,fz=az")
 VERBS = ("calibrate", "diagnose", "compare", "history", "lot")
 
 
@@ -176,38 +175,6 @@ def test_campaigns_and_advice_are_those_of_the_commands(tmp_path):
     advice.save(tmp_path / "advice")
     kept = json.loads((tmp_path / "advice/advice.json").read_text(encoding="utf-8"))
     assert (kept["state"], kept["positions"]) == ("enough", [*range(1, 7)])
-
-
-def test_positions_and_a_data_sheet_are_those_of_the_commands(every, guide, tmp_path):
-    words = ("--positions", 4, "--model", "bias", "--approach", "gravity", "--starts", 1)
-    succeed("design", *words, "--roll", "-50gon", "50gon", "--out", tmp_path / "one.yaml")
-    (tmp_path / "function").mkdir()
-    every["design"].save(tmp_path / "function/one.yaml")
-    acs.write_campaign(guide["campaign"], tmp_path / "imu")
-    succeed("data-sheet", tmp_path / "imu", "--out", tmp_path / "sheet.yaml")
-    acs.data_sheet(tmp_path / "imu").save(tmp_path / "function/sheet.yaml")
-    for name in ("one.yaml", "sheet.yaml"):
-        assert len({path.read_bytes() for path in tmp_path.rglob(name)}) == 1
-
-
-def test_a_log_gives_what_the_commands_make_of_it(guide, tmp_path):
-    log, calibration = guide["folder"] / "imu.csv", guide["calibration"]
-    words = (*WORDS, "--gravity", 9.80795, "--window", "500ms", "--no-figure")
-    succeed("import", log, *words, "--out", tmp_path / "found")
-    kept = acs.read_campaign(tmp_path / "found")
-    holds = acs.find_holds(log, gravity="9.80795 m/s^2", window=0.5, **HOW)
-    assert (kept.name, kept.n_positions) == (holds.name, 24)
-    np.testing.assert_allclose(kept.forces, holds.forces, rtol=1e-13)
-    for range_ in (78.5, "78.5 m/s^2"):
-        assert acs.find_holds(log, range=range_, **HOW).header.range_mps2 == 78.5
-
-    file = guide["folder"] / "calibrated/calibration.json"
-    succeed("apply", file, log, *WORDS, "--sigma", 0.01, "--out", tmp_path / "leveled.parquet")
-    leveled = pd.read_parquet(tmp_path / "leveled.parquet").astype({"near_pole": "boolean"})
-    pd.testing.assert_frame_equal(acs.apply(calibration, log, sigma=0.01, **HOW), leveled)
-    again = calibration.apply(acs.read_log(log, **HOW), sigma="10 mm/s^2")
-    pd.testing.assert_frame_equal(again, leveled)
-    assert (leveled["sigma_roll_mgon"] > 1.5 * guide["leveled"]["sigma_roll_mgon"]).all()
 
 
 # --- a calibration -------------------------------------------------------------------------------
