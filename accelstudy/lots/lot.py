@@ -6,13 +6,14 @@ import ctypes
 import math
 import signal
 import sys
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from concurrent.futures import ProcessPoolExecutor
 from concurrent.futures.process import BrokenProcessPool
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass, replace
-from functools import partial
+from functools import cached_property, partial
 from multiprocessing import active_children, get_context
+from typing import TypeAlias
 
 from accelstudy.approaches import Approach
 from accelstudy.basics.errors import InputError
@@ -20,21 +21,30 @@ from accelstudy.campaign.calibration.fit import usual_approach
 from accelstudy.campaign.session import Campaign
 from accelstudy.diagnosis.decision.problem import BaseFit
 from accelstudy.diagnosis.evidence.noise_tests import NOISES
-from accelstudy.diagnosis.rules import RULES
-from accelstudy.effects import get_effect
 from accelstudy.lots.evidence import Sensor, SensorEvidence
 from accelstudy.lots.noise import NoisePrior, noises_of_lot
-from accelstudy.lots.passes import LEVEL, ODD, Alternative, LotEffect, Mapped, Pass, SensorState
-from accelstudy.lots.sizes import Names
+from accelstudy.lots.passes import (
+    LEVEL,
+    MIN_HAVING,
+    ODD,
+    Alternative,
+    LotEffect,
+    Mapped,
+    Pass,
+    SensorState,
+)
 from accelstudy.sensors.models import compose, composition_name
 from accelstudy.sensors.sensor import SensorModel
+
+Beside: TypeAlias = Callable[[Sequence[LotEffect]], Pass]
+"""Weighs all sensors with some effects in their models."""
 
 LEVEL_OF_REST = 0.01
 """Level of the test whether the model of a lot lacks more than what was found."""
 END_WITH_PARENT = 1
 """Option of prctl(2) by which a process gets a signal when its parent ends, PR_SET_PDEATHSIG."""
-MAX_PASSES = 3
-"""Largest number of passes that add effects to the model."""
+MAX_EFFECTS = 3
+"""Largest number of effects that are added to the model, one after the other."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -54,7 +64,7 @@ class LotDiagnosis:
     passes: tuple[Pass, ...]
     model: SensorModel
     effects: tuple[LotEffect, ...] = ()
-    close: tuple[Names, ...] = ()
+    close: tuple[tuple[str, ...], ...] = ()
     explained: bool = True
 
     @property
@@ -66,10 +76,6 @@ class LotDiagnosis:
     def evidence(self) -> tuple[SensorEvidence, ...]:
         """Evidence of each campaign by itself."""
         return self.passes[0].evidence
-
-    def model_of(self, i: int) -> SensorModel:
-        """Model of the type for a sensor, with its own times of what is sudden."""
-        return self.last.sensors[i].model or self.model
 
     @property
     def p_value(self) -> float:
@@ -92,17 +98,19 @@ class LotDiagnosis:
         """The most probable classes of what has no sure name, with their posterior."""
         return next((one for one in self.passes if one.missing), self.passes[-1]).alternatives
 
-    @property
+    @cached_property
     def each(self) -> list[SensorState]:
         """Names of what the model lacks for each sensor, and their posterior."""
-        told = {found.names[0] for found in self.effects}
-        rows = []
-        for states in zip(*(one.each for one in self.passes), strict=True):
-            names = [name for state in states for name in state.names if name in told]
-            names += [name for name in states[-1].names if name == ODD]
-            probability = math.prod(state.posterior for state in states)
-            rows.append(SensorState(states[0].campaign, tuple(names), probability))
-        return rows
+        having = {one.names[0]: one.having for one in self.effects}
+        odd, states = {one.campaign for one in self.last.odd}, list[SensorState]()
+        for i, (one, alone) in enumerate(zip(self.evidence, self.last.alone.tolist(), strict=True)):
+            names = [name for name, p in having.items() if p[i] > MIN_HAVING]
+            sure = math.prod(max(p[i], 1 - p[i]) for p in having.values())
+            if one.campaign in odd:
+                states.append(SensorState(one.campaign, (*names, ODD), sure * alone))
+            else:
+                states.append(SensorState(one.campaign, tuple(names), sure * (1 - alone)))
+        return states
 
 
 def weigh_lot(
@@ -132,73 +140,77 @@ def weigh_lot(
         for i, campaign in enumerate(campaigns)
     ]
     with _processes(cores, len(sensors)) as mapped:
-        passes, whole = [Pass.of(sensors, mapped)], model
-        effects: list[LotEffect] = []
-        for _ in range(MAX_PASSES):
-            known = {effect.name for effect in whole.effects}
-            known |= {name for found in effects for name in found.names}
-            new = [found for found in passes[-1].found if not known & {*found.names}]
-            if not new and len(passes) > 1:
+        passes, effects = [Pass.of(sensors, mapped)], list[LotEffect]()
+
+        def beside(effects: Sequence[LotEffect]) -> Pass:
+            """Weigh all sensors with some effects, and with the noise that they tell together."""
+            models = [
+                extended(model, [one.specs[i] for one in effects if one.spec])
+                for i in range(len(sensors))
+            ]
+            return Pass.of(with_noise_of_lot(sensors, models), mapped)
+
+        while True:
+            found = passes[-1].found
+            new = [] if found is None or found.is_one_of(effects) else [found]
+            # The first pass is by what each campaign says of its noise, all others by the lot.
+            if len(passes) > 1 and (not new or len(effects) == MAX_EFFECTS):
                 break
-            specs = [found.spec for found in new if found.spec]
-            if (after := _again(passes[-1], specs, mapped)) is None:
+            chosen = _settled([*effects, *new], beside)
+            after = beside(chosen)
+            if not any(one.base for one in after.evidence):  # no campaign determines so much
                 break
-            passes.append(after)
-            whole, effects = extended(whole, specs), [*effects, *new]
-        nameless = any(f.spec is None and f.names[0] not in NOISES for f in effects)
-        if not nameless and _explained(passes[-1], whole, len(effects), mapped):
-            return LotDiagnosis(tuple(passes), whole, tuple(effects))
-    close = tuple(found.names for found in effects if found.spec is not None)
+            passes, effects = [*passes, after], chosen
+        nameless = any(one.spec is None and one.names[0] not in NOISES for one in effects)
+        explained = not nameless and _explained(passes[-1], effects, beside)
+    if explained:
+        whole = extended(model, [one.spec for one in effects if one.spec])
+        return LotDiagnosis(tuple(passes), whole, tuple(effects))
+    close = tuple(one.names for one in effects if one.spec)
     return LotDiagnosis(tuple(passes), model, close=close, explained=False)
 
 
-def _again(before: Pass, specs: Sequence[str], mapped: Mapped) -> Pass | None:
-    """Weigh all sensors with further effects, and with the noise that they tell together.
+def _settled(effects: Sequence[LotEffect], beside: Beside) -> list[LotEffect]:
+    """Effects, each as it is found beside the others, as the last one was.
 
-    None if no campaign determines the model.
-
-    Parameters
-    ----------
-    before : Pass, that found the effects
-    specs : the effects
-    mapped : maps a function over the sensors
+    One effect may imitate the sum of two: beside the second one the first one shows what it is.
     """
-    sensors, effects = list[Sensor](), [get_effect(spec) for spec in specs]
-    for sensor, said in zip(before.sensors, before.evidence, strict=True):
-        # What is sudden happened to each sensor at a time of its own.
-        own = [said.specs.get(e.name, e.spec) if e.sudden else e.spec for e in effects]
-        model = None if sensor.model is None else extended(sensor.model, own)
-        sensors.append(replace(sensor, model=model, noise=None))
+    settled, changed = list(effects), False
+    for k, before in enumerate(effects):
+        others = [*settled[:k], *settled[k + 1 :]]
+        if k < len(effects) - 1 or changed:
+            found = beside(others).found
+            if found is not None and not found.is_one_of(others):
+                settled[k] = found
+                changed |= found.names[0] not in before.names
+    return settled
 
-    def fitted(i: int, noise: NoisePrior | None = None) -> BaseFit | None:
+
+def _explained(now: Pass, effects: Sequence[LotEffect], beside: Beside) -> bool:
+    """Whether what was found explains the lot, with the most probable of what is not sure."""
+    effects = list(effects)
+    while now.p_value_of_usual < LEVEL_OF_REST:
+        best = now.best
+        if best.names[0] in NOISES or best.is_one_of(effects):
+            return True
+        if best.spec is None or len(effects) >= MAX_EFFECTS:
+            return False
+        effects.append(best)
+        now = beside(effects)
+    return any(one.base for one in now.evidence)
+
+
+def with_noise_of_lot(sensors: Sequence[Sensor], models: Sequence[SensorModel]) -> list[Sensor]:
+    """Sensors with other models, and with the noise that they tell together."""
+
+    def fit(i: int, sigma: float | None) -> BaseFit | None:
+        noise = None if sigma is None else NoisePrior(sigma)
         with suppress(InputError):
-            return replace(sensors[i], noise=noise).fit()
+            return replace(sensors[i], model=models[i], noise=noise).fit()
         return None
 
-    fits = [fitted(i) for i in range(len(sensors))]
-    noises = noises_of_lot(fits, lambda i, sigma: fitted(i, NoisePrior(sigma, RULES.freedom_given)))
-    for i, noise in enumerate(noises):
-        fit = fits[i] if noise is None else fitted(i, noise)
-        # A campaign that does not determine the model says nothing of what else is missing.
-        known = None if fit is None else fit.solution.model
-        sensors[i] = replace(sensors[i], model=known, noise=noise)
-    return Pass.of(sensors, mapped) if any(one.model for one in sensors) else None
-
-
-def _explained(now: Pass, whole: SensorModel, known: int, mapped: Mapped) -> bool:
-    """Whether what was found explains the lot, with the most probable of what is not sure."""
-    while now.p_value_of_usual < LEVEL_OF_REST:
-        best = next(iter(now.given))
-        if best in NOISES or {effect.name for effect in whole.effects} & {*now.classes[best]}:
-            return True
-        spec = now.spec(best)
-        if spec is None or known >= MAX_PASSES:
-            return False
-        whole, known = extended(whole, [spec]), known + 1
-        if (after := _again(now, [spec], mapped)) is None:
-            return False
-        now = after
-    return True
+    each = zip(sensors, models, noises_of_lot(len(sensors), fit), strict=True)
+    return [replace(sensor, model=model, noise=noise) for sensor, model, noise in each]
 
 
 def extended(model: SensorModel, specs: Iterable[str]) -> SensorModel:

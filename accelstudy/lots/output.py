@@ -138,7 +138,7 @@ class Lot(Result):
         fits, failed = dict[int, CampaignFit](), dict[str, str]()
         for i, sensor in enumerate(diagnosis.last.sensors):
             try:
-                fits[i] = fit_campaign(sensor.campaign, diagnosis.model_of(i), sensor.approach)
+                fits[i] = fit_campaign(sensor.campaign, sensor.model, sensor.approach)
             except InputError as error:
                 failed[sensor.campaign.name] = str(error)
         return cls(diagnosis, model, fits, failed, without)
@@ -239,7 +239,7 @@ class Lot(Result):
         return LotDocument.content({
             "sensors": len(d.last.sensors),
             "anything": {"p_value": d.p_value, "missing": d.missing, "level": LEVEL},
-            "effects": [{**one._asdict(), "parameters": self._sizes(one)} for one in d.effects],
+            "effects": [{**one.statement, "parameters": self._sizes(one)} for one in d.effects],
             "explained": d.explained,
             "close": d.close,
             "alternatives": d.alternatives,

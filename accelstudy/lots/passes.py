@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import cached_property
 from typing import Any, NamedTuple, TypeAlias
 
@@ -13,20 +13,14 @@ from numpy.typing import NDArray
 from scipy import stats
 
 from accelstudy.basics.progress import track
-from accelstudy.diagnosis.decision.problem import Problem
 from accelstudy.diagnosis.evidence.candidates import UNKNOWN
-from accelstudy.diagnosis.evidence.noise_tests import AXES, NOISES, TAILS
+from accelstudy.diagnosis.evidence.noise_tests import NOISES
+from accelstudy.diagnosis.evidence.size import Level
 from accelstudy.diagnosis.rules import RULES
-from accelstudy.lots.evidence import (
-    Sensor,
-    SensorEvidence,
-    best_settings,
-    lot_classes,
-    pose_mean,
-    unknown_odds,
-)
-from accelstudy.lots.mixture import Mixture
-from accelstudy.lots.sizes import Names, TypeSizes
+from accelstudy.effects import get_effect
+from accelstudy.lots.evidence import NOISE_PRIORS, Sensor, SensorEvidence, lot_classes
+from accelstudy.lots.mixture import Mixture, log_odd
+from accelstudy.lots.sizes import LotResiduals, Statistics
 
 Array = NDArray[np.float64]
 Mapped: TypeAlias = Callable[..., Iterator[Any]]
@@ -35,30 +29,23 @@ Mapped: TypeAlias = Callable[..., Iterator[Any]]
 LEVEL = 0.05
 """Level of the test whether anything is missing in a lot: half of it by what each campaign says of
 its noise, and half by the noise of the lot."""
+LEVEL_OF_PATTERN = 0.01
+"""Level of the test for a pattern in common, from which on it is not noise that is wrong."""
 FALSE_ODD = 0.05
 """False discovery rate of odd sensors."""
 MAX_ODD_SHARE = 0.1
 """Share of the sensors up to which an effect makes them odd, and does not belong to the type."""
 MIN_PROBABILITY = float(np.finfo(float).tiny)
 """Least p-value of which the logarithm is taken."""
-MIN_RIVAL = 0.02
-"""Least posterior probability of a name that is reported with others."""
 MIN_CERTAIN = 0.95
 """Posterior probability of a set of names that are reported together, if no name is sure alone."""
 MAX_NAMES = 3
 """Largest number of names in such a set."""
-EXCLUSIVE = 0.1
-"""Share of the posterior of a name up to which another one is missing beside it, and not in its
-place."""
 EFFECT = "effect"
-WEIGHTS = {
-    EFFECT: 1.0,
-    UNKNOWN: RULES.prior_unknown,
-    **dict.fromkeys(NOISES, RULES.prior_coloured),
-    AXES: RULES.prior_axes,
-    TAILS: RULES.prior_tails,
-}
+WEIGHTS = {EFFECT: 1.0, UNKNOWN: RULES.prior_unknown, **NOISE_PRIORS}
 """Prior weights of what the model of a lot may lack, relative to one effect of the catalogue."""
+OF_SENSORS = ("specs", "having")
+"""What an effect of the lot has for each sensor."""
 ODD = "odd"
 """Name of an effect that one sensor has, and neither the model nor the other sensors."""
 MIN_HAVING = 0.5
@@ -75,13 +62,26 @@ class LotEffect(NamedTuple):
     share : float, of the sensors
     share_ci95 : tuple of two floats
     spec : str, the effect in the setting that explains most; None of what is no effect
+    specs : (n,) tuple of str, that of each sensor: what is sudden has a time of its own
+    having : (n,) array, posterior of each sensor to have it
     """
 
     names: tuple[str, ...]
     posterior: float
     share: float
     share_ci95: tuple[float, float]
-    spec: str | None = None
+    spec: str | None
+    specs: tuple[str, ...]
+    having: Array
+
+    @property
+    def statement(self) -> dict[str, Any]:
+        """What is said of it for the lot as a whole."""
+        return {key: getattr(self, key) for key in self._fields if key not in OF_SENSORS}
+
+    def is_one_of(self, effects: Sequence[LotEffect]) -> bool:
+        """Whether one of some effects has the same most probable name."""
+        return self.names[0] in {one.names[0] for one in effects}
 
 
 class Alternative(NamedTuple):
@@ -107,14 +107,10 @@ class Pass:
     ----------
     sensors : tuple of Sensor
     evidence : tuple of SensorEvidence, theirs
-    sizes : TypeSizes, of effects that most sensors show; None where there are none
-    mean : Problem, that the mean residuals of the sensors pose which are not odd; None without one
     """
 
     sensors: tuple[Sensor, ...]
     evidence: tuple[SensorEvidence, ...]
-    sizes: TypeSizes | None = None
-    mean: Problem | None = None
 
     @classmethod
     def of(cls, sensors: Sequence[Sensor], mapped: Mapped) -> Pass:
@@ -126,23 +122,34 @@ class Pass:
         mapped : maps a function over the sensors
         """
         each = track(mapped(Sensor.evidence, sensors), "evidence of the sensors", len(sensors))
-        one = cls(tuple(sensors), tuple(each))
-        # What is common to all is that of the sensors which are not odd whatever their sizes.
-        some = [i for i in one.usual if one.evidence[i].base]
-        said = [one.evidence[i] for i in some]
-        if len(some) < 2:
-            return one
-        one = replace(one, mean=pose_mean([sensors[i] for i in some], said))
-        refined = {} if one.mean is None else best_settings(one.mean)
-        count = Counter(name for shown in said for name in shown.shapes)
-        shapes = dict[str, Sequence[str]]()
-        for name in sorted(name for name, times in count.items() if 2 * times > len(said)):
-            first = next(shown.shapes[name] for shown in said if name in shown.shapes)
-            shapes[name] = [*first, *([refined[name]] if name in refined else [])]
-        if not shapes:
-            return one
-        usual = np.isin(np.arange(len(sensors)), some)
-        return replace(one, sizes=TypeSizes.of([e.frame for e in one.evidence], shapes, usual))
+        return cls(tuple(sensors), tuple(each))
+
+    # --- what the sensors tell --------------------------------------------------------------
+
+    @cached_property
+    def residuals(self) -> LotResiduals:
+        """Residuals of the sensors."""
+        silent = Level.of_nothing_stated()
+        levels = [silent if one.base is None else one.base.level for one in self.evidence]
+        return LotResiduals([one.frame for one in self.evidence], levels)
+
+    @cached_property
+    def shown(self) -> dict[str, dict[str, Statistics]]:
+        """What sensors tell of the sizes of lasting effects that most of them show, by shapes.
+
+        The shapes are those that the campaigns try which show an effect least and most.
+        """
+        told = dict[str, dict[str, Statistics]]()
+        for name in sorted({name for one in self.evidence for name in one.shapes}):
+            showing = [one for one in self.evidence if name in one.shapes]
+            if 2 * len(showing) > sum(one.base is not None for one in self.evidence):
+                most = max(showing, key=lambda one: one.odds[name])
+                each = {
+                    spec: self.residuals.statistics(spec)
+                    for spec in dict.fromkeys([*showing[0].shapes[name], most.specs[name]])
+                }
+                told[name] = {spec: one for spec, one in each.items() if one.right.size}
+        return {name: each for name, each in told.items() if each}
 
     @cached_property
     def classes(self) -> dict[str, tuple[str, ...]]:
@@ -151,120 +158,66 @@ class Pass:
 
     @cached_property
     def mixture(self) -> Mixture:
-        """Posterior of all sets of effects."""
-        odds = {
-            name: np.array([one.odds.get(name, 0.0) for one in self.evidence])
-            for name in self.classes
+        """Posterior of everything that the model of the lot may lack."""
+        # What sensors have in common is no noise.
+        pattern = min(self.residuals.p_value_of_pattern, default=1.0) < LEVEL_OF_PATTERN
+        prior = priors_of([name for name in self.classes if not pattern or name not in NOISES])
+        own = {n: np.array([one.odds.get(n, 0.0) for one in self.evidence]) for n in prior}
+        odd, typical = log_odd(prior, own), {}
+        for name in {*self.shown} & {*prior}:
+            sizes = self.residuals.typical(self.shown[name][self._best[name]], odd)
+            # What few sensors have, has no sizes of a type.
+            if max(sizes, key=lambda one: one.log_likelihood).share * len(odd) > self._few:
+                typical[name] = sizes
+        return Mixture(prior, own, typical)
+
+    @cached_property
+    def _best(self) -> dict[str, str]:
+        """Effects of `shown` in the shape that explains most if it is equally large in all."""
+        return {
+            name: max(each, key=lambda spec: self.residuals.pooled(each[spec])[1])
+            for name, each in self.shown.items()
         }
-        first = {name: one for one, members in self.classes.items() for name in members}
-        pairs: dict[Names, Array] = {}
-        for i, one in enumerate(self.evidence):
-            for both, log in one.pairs.items():
-                names = tuple(sorted({first[name] for name in both if name in first}))
-                if len(names) == 2:
-                    told = pairs.setdefault(names, np.full(len(self.evidence), -np.inf))
-                    told[i] = max(log, told[i])
-        # Names of one kind share its weight evenly.
-        usual = {n: UNKNOWN if n.startswith(UNKNOWN) else EFFECT for n in self.classes}
-        kinds = {name: name if name in WEIGHTS else kind for name, kind in usual.items()}
-        counts = Counter(kinds.values())
-        total = sum(WEIGHTS[kind] for kind in counts)
-        prior = {name: WEIGHTS[kind] / counts[kind] / total for name, kind in kinds.items()}
-        return Mixture(odds, pairs, prior, self._common, self.sizes, self._few)
 
     @property
-    def _common(self) -> dict[str, float]:
-        """Log odds of what has no name, that it is the same in all sensors."""
-        if self.mean is None:
-            return {}
-        return unknown_odds(self.mean, float(np.logaddexp.reduce(self.mean.detection.noise)))
+    def _few(self) -> float:
+        """Number of sensors up to which an effect makes them odd."""
+        return max(1, MAX_ODD_SHARE * len(self.sensors))
+
+    # --- whether anything is missing --------------------------------------------------------
 
     @cached_property
     def p_value(self) -> float:
-        """Probability that sensors without anything missing would show as much evidence."""
-        return self._p_value(self.evidence)
+        """Probability that sensors without anything missing would show as much evidence.
+
+        Fisher's combination of their p-values finds what many have, Tippett's what a single one
+        has, and what they have in common is too small for one of them. The smallest counts for all.
+        """
+        return _smallest([*_combined(self.evidence), *self._in_common])
 
     @property
     def p_value_of_usual(self) -> float:
         """That of the sensors which are not odd."""
-        return self._p_value([self.evidence[i] for i in self.usual])
+        return _smallest([*_combined([self.evidence[i] for i in self.usual]), *self._in_common])
 
-    def _p_value(self, evidence: Sequence[SensorEvidence]) -> float:
-        """By the sum of what sensors show, the most that one shows, and the mean if they have one.
-
-        Fisher's combination of their p-values finds what many have, Tippett's what a single one
-        has. The smallest of the tests counts for all.
-        """
-        # Beyond the smallest number a probability is 0; without a sensor there is nothing.
-        each = [max(one.p_value, MIN_PROBABILITY) for one in evidence] or [1.0]
-        tests = [stats.combine_pvalues(each, how).pvalue for how in ("fisher", "tippett")]
-        tests += [] if self.mean is None else [self.mean.detection.p_value]
-        return float(min(len(tests) * min(tests), 1.0))
+    @cached_property
+    def _in_common(self) -> list[float]:
+        """P-values of what the sensors have in common: sizes of effects, and any pattern."""
+        shown = [one for each in self.shown.values() for one in each.values()]
+        sizes = [min(map(self.residuals.p_value, shown)) * len(shown)] if shown else []
+        return [*sizes, *self.residuals.p_value_of_pattern]
 
     @property
     def missing(self) -> bool:
         """Whether anything is missing, at one level for the whole lot."""
         return self.p_value < LEVEL / 2
 
-    @cached_property
-    def wrong(self) -> float:
-        """Posterior probability that the model lacks anything, or that a sensor is odd."""
-        nothing = self.mixture.posterior[()]
-        none_odd = np.prod(1 - self.mixture.sets[()].sensors[-1]) if nothing > 0 else 1.0
-        return float(max(1 - nothing * none_odd, 1e-300))
+    # --- what is missing --------------------------------------------------------------------
 
     @cached_property
     def given(self) -> dict[str, float]:
-        """Posterior of each class to be one of the lot, if anything is wrong, highest first."""
-        given = {name: self.mixture.of_any([name]) / self.wrong for name in self.classes}
-        return dict(sorted(given.items(), key=lambda item: -item[1]))
-
-    @cached_property
-    def found(self) -> list[LotEffect]:
-        """Missing effects whose names are sure enough.
-
-        What few sensors have makes these odd.
-        """
-        if not self.missing:
-            return []
-        found, taken = [], set[str]()
-        for name, given in self.given.items():
-            if name in taken or name in self._rare or given < MIN_RIVAL:
-                continue
-            alike = self._credible_set(name, taken)
-            posterior = min(self.mixture.of_any(alike) / self.wrong, 1.0)
-            if posterior < MIN_CERTAIN:
-                alike, posterior = [name], given
-            if posterior >= RULES.sure:
-                taken.update(alike)
-                members = tuple(member for one in alike for member in self.classes[one])
-                share, low, high = self.mixture.share(name)
-                found.append(LotEffect(members, posterior, share, (low, high), self.spec(name)))
-        return found
-
-    def _credible_set(self, name: str, taken: set[str]) -> list[str]:
-        """Name with those that may be missing in its place, until one of them is certain to be."""
-        alike, mixture = [name], self.mixture
-        for rival, given in self.given.items():
-            certain = mixture.of_any(alike) >= MIN_CERTAIN * self.wrong
-            if certain or given < MIN_RIVAL or len(alike) == MAX_NAMES:
-                break
-            beside = max(mixture.of_all({rival, one}) for one in alike)
-            if rival not in {*alike, *taken} and beside < EXCLUSIVE * mixture.of_any([rival]):
-                alike.append(rival)
-        return alike
-
-    @cached_property
-    def _rare(self) -> set[str]:
-        """Classes that few sensors have, if the lot has them."""
-        mixture = self.mixture
-        least = {name: MIN_HAVING * max(mixture.of_any([name]), 1e-300) for name in self.classes}
-        return {n for n, p in least.items() if np.sum(mixture.having(n) > p) <= self._few}
-
-    @property
-    def _few(self) -> float:
-        """Number of sensors up to which an effect makes them odd."""
-        return max(1, MAX_ODD_SHARE * len(self.sensors))
+        """Posterior of each class to be that of the lot, if anything is wrong, highest first."""
+        return {name: p / self.mixture.wrong for name, p in self.mixture.posterior.items()}
 
     @property
     def alternatives(self) -> list[Alternative]:
@@ -272,31 +225,81 @@ class Pass:
         return [Alternative(self.classes[name], p) for name, p in [*self.given.items()][:3]]
 
     @cached_property
-    def odd(self) -> list[SensorState]:
-        """Odd sensors, the surest first; 5 of 100 are expected to be wrong.
+    def found(self) -> LotEffect | None:
+        """The missing effect, if a name is sure enough, or one of a few names is.
+
+        What few sensors have makes these odd.
+        """
+        names = [name for name in self.given if name not in self._rare] if self.missing else []
+        sums = np.cumsum([self.given[name] for name in names[:MAX_NAMES]])
+        count = 1 + int(np.argmax(sums >= MIN_CERTAIN)) if names else 0
+        sure = count and sums[count - 1] >= RULES.sure
+        return self._effect(names[:count], float(sums[count - 1])) if sure else None
+
+    @property
+    def best(self) -> LotEffect:
+        """The most probable effect, however sure."""
+        name, posterior = next(iter(self.given.items()))
+        return self._effect([name], posterior)
+
+    def _effect(self, names: Sequence[str], posterior: float) -> LotEffect:
+        """Say of an effect, which has one of some names, what the sensors tell of it."""
+        first = names[0]
+        members = tuple(member for name in names for member in self.classes[name])
+        share, low, high = self.mixture.share(first)
+        having, each = self.mixture.effects[first].having, [one.specs for one in self.evidence]
+        counted = Counter[str]()
+        for specs, weight in zip(each, having.tolist(), strict=True):
+            if first in specs:
+                counted[specs[first]] += weight
+        usual = max(counted, key=counted.__getitem__, default=None)
+        spec = self._best.get(first, usual)
+        sudden = spec is not None and get_effect(spec).sudden
+        own = tuple(specs.get(first, spec) if sudden else spec for specs in each)
+        return LotEffect(members, min(posterior, 1.0), share, (low, high), spec, own, having)
+
+    @cached_property
+    def _rare(self) -> set[str]:
+        """Classes that few sensors have, if the lot has them."""
+        told = self.mixture.effects
+        return {name for name in told if np.sum(told[name].having > MIN_HAVING) <= self._few}
+
+    # --- which sensors ----------------------------------------------------------------------
+
+    @cached_property
+    def alone(self) -> Array:
+        """Posterior of each sensor to be odd, (n,).
 
         A sensor is odd by whatever nothing accounts for that is found in the lot. If that makes
         more than few sensors odd, the lot has something that has no sure name, and what is rare
         makes them so.
         """
-        nameless = {*self.classes} - {one.names[0] for one in self.found}
-        odd = self._odd_by(nameless)
-        return odd if len(odd) <= self._few else self._odd_by(self._rare)
+        *having, odd = self.mixture.sensors
+        each = dict(zip(self.mixture.effects, having, strict=True))
+        unnamed = sum((each[name] for name in each if name not in self._named), odd)
+        if _count_odd(unnamed) <= self._few:
+            return np.asarray(unnamed)
+        return np.asarray(sum((each[name] for name in self._rare), odd))
 
-    def _odd_by(self, strange: set[str]) -> list[SensorState]:
-        """Sensors that are odd if they have one of some classes."""
-        of_sets, odd = self.mixture.sensors
-        alone = sum((p for names, p in of_sets.items() if strange & {*names}), odd)
+    @property
+    def _named(self) -> tuple[str, ...]:
+        """Names of what was found."""
+        return () if self.found is None else self.found.names
+
+    @cached_property
+    def odd(self) -> list[SensorState]:
+        """Odd sensors, the surest first; 5 of 100 are expected to be wrong."""
+        names = [name for name in self.mixture.own if name not in self._named]
+        own = np.array([self.mixture.own[n] + np.log(self.mixture.prior[n]) for n in names])
         # Sensors of which nobody doubts it stay in their order.
-        order = np.argsort(-np.round(alone, 3), kind="stable")
-        wrong = np.cumsum(1 - alone[order]) / np.arange(1, len(alone) + 1)
-        known = {one.names[0] for one in self.found}
-        prior = {name: p for name, p in self.mixture.prior.items() if name not in known}
-        own = np.array([self.mixture.odds[name] + np.log(p) for name, p in prior.items()])
-        classes = [self.classes[name] for name in prior]
+        order = np.argsort(-np.round(self.alone, 3), kind="stable")[: _count_odd(self.alone)]
         return [
-            SensorState(self.evidence[i].campaign, classes[own[:, i].argmax()], float(alone[i]))
-            for i in order[: int(np.sum(wrong <= FALSE_ODD))]
+            SensorState(
+                self.evidence[i].campaign,
+                self.classes[names[own[:, i].argmax()]],
+                float(self.alone[i]),
+            )
+            for i in order
         ]
 
     @property
@@ -305,20 +308,29 @@ class Pass:
         odd = {one.campaign for one in self.odd}
         return [i for i, each in enumerate(self.evidence) if each.campaign not in odd]
 
-    @cached_property
-    def each(self) -> list[SensorState]:
-        """Names of what the model lacks for each sensor, and their posterior."""
-        of_sets, odd = self.mixture.sensors
-        sets = [tuple(n for n in self.classes if n in names) for names in of_sets] + [(ODD,)]
-        each = zip(self.evidence, np.array([*of_sets.values(), odd]).T, strict=True)
-        return [SensorState(one.campaign, sets[int(p.argmax())], float(p.max())) for one, p in each]
 
-    def spec(self, name: str) -> str | None:
-        """Return an effect in the setting that explains most; None of what is no effect."""
-        if self.sizes is not None and name in self.sizes.specs:
-            return self.sizes.specs[name]
-        counted = Counter[str]()
-        for one, weight in zip(self.evidence, self.mixture.having(name).tolist(), strict=True):
-            if name in one.specs:
-                counted[one.specs[name]] += weight
-        return max(counted, key=counted.__getitem__, default=None)
+def _count_odd(posterior: Array) -> int:
+    """How many sensors are called odd, by the posterior of each, so that few are so wrongly."""
+    wrong = np.cumsum(np.sort(1 - posterior)) / np.arange(1, len(posterior) + 1)
+    return int(np.sum(wrong <= FALSE_ODD))
+
+
+def priors_of(names: Sequence[str]) -> dict[str, float]:
+    """Prior probabilities of what the model of a lot may lack, the same for names of one kind."""
+    usual = {n: UNKNOWN if n.startswith(UNKNOWN) else EFFECT for n in names}
+    kinds = {name: name if name in WEIGHTS else kind for name, kind in usual.items()}
+    counts = Counter(kinds.values())
+    total = sum(WEIGHTS[kind] for kind in counts)
+    return {name: WEIGHTS[kind] / counts[kind] / total for name, kind in kinds.items()}
+
+
+def _combined(evidence: Sequence[SensorEvidence]) -> list[float]:
+    """Combine the p-values of campaigns, by Fisher and by Tippett."""
+    # Beyond the smallest number a probability is 0; without a sensor there is nothing.
+    each = [max(one.p_value, MIN_PROBABILITY) for one in evidence] or [1.0]
+    return [float(stats.combine_pvalues(each, how).pvalue) for how in ("fisher", "tippett")]
+
+
+def _smallest(p_values: Sequence[float]) -> float:
+    """The smallest of some p-values, as one for all."""
+    return min(len(p_values) * min(p_values), 1.0)

@@ -1,260 +1,234 @@
-"""Sizes of effects in a type: the same in all of its sensors, or with a scatter about their mean.
+"""Sizes of an effect in a type: the same in all of its sensors, or with a scatter about their mean.
 
-Sensor i tells of the parameters β of some effects by ℓ_i(β) = βᵀ b_i − βᵀ N_i β / 2, in units of
-its noise. In a type each effect has sizes β ~ N(μ, S), S = τ² ‖μ‖²/k · I, in a part ρ of the
-sensors, and 0 in the others, independently of other effects. So the odds of sensor i for a set are
+Sensor i tells of the parameters β of an effect by N_i = AᵀA and b_i = Aᵀz, with its residuals z of
+unit weight and their derivatives A. In a type the effect has sizes β ~ N(μ, S), S = τ² ‖μ‖²/k · I,
+in a part ρ of the sensors, and 0 in the others. It explains of the squares ‖z‖² of a sensor
 
-    log r_i = ℓ_i(μ) + (b_i − N_i μ)ᵀ (S⁻¹ + N_i)⁻¹ (b_i − N_i μ)/2 − log|I + N_i S|/2
+    q_i = 2 μᵀb_i − μᵀN_i μ + (b_i − N_i μ)ᵀ (S⁻¹ + N_i)⁻¹ (b_i − N_i μ),
 
-for some τ, from 0 on, with the μ and ρ that make the likelihood of all sensors largest. A μ that is
-fitted pays for that as any effect of unknown size does: with λ = ρ μᵀ Σ_i (N_i⁻¹ + S)⁻¹ μ, the
-noncentrality of what all sensors show, and g of its prior (`evidence.size`), evidence is likelihood
-times the mean of (1 + g)^(−k/2) exp(−λ/(2 + 2 g)).
+so the odds of the sensor for the effect are r_i = |I + N_i S|^(−1/2) m(‖z‖² − q_i) / m(‖z‖²), with
+the density m of noise of which its campaign knows the level more or less (`evidence.size`). That is
+so for some τ, from 0 on, with the μ and ρ that make the likelihood of all sensors largest. A μ that
+is fitted pays for that as any effect of unknown size does: with λ = μᵀ Σ (N_i⁻¹ + S)⁻¹ μ over the
+sensors that have the effect, and g of its prior, the evidence is the likelihood times the mean of
+(1 + g)^(−k/2) exp(−λ/(2 + 2 g)).
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Sequence
 from contextlib import suppress
 from dataclasses import dataclass
 from functools import cached_property
-from itertools import combinations
-from typing import NamedTuple, TypeVar
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy import stats
+from scipy.special import gammaln
 
 from accelstudy.basics.errors import InputError
-from accelstudy.diagnosis.evidence.size import SIZE_WEIGHTS, SIZES, log_mean
+from accelstudy.diagnosis.evidence.size import SIZE_WEIGHTS, SIZES, Level, log_mean
 from accelstudy.diagnosis.rules import RULES
 from accelstudy.diagnosis.space.frame import SessionFit
 from accelstudy.effects import get_effect
 
 Array = NDArray[np.float64]
-T = TypeVar("T")
-Names = tuple[str, ...]
-"""Names of some effects, in order."""
 
-SCATTERS = (0.25, 0.0, 1.0)
+SCATTERS = (0.0, 0.25, 1.0)
 """τ, scatter of the parameters of a type in parts of their size; beyond, each sensor has its own
-size. The search for the first one starts the others."""
+size."""
 SHARES = (0.9, 0.35)
-"""ρ from which the search for a single effect begins: many sensors have it, or few."""
-MIN_FREEDOM = 20
-"""Least degrees of freedom of an estimate of the noise."""
+"""ρ from which the search begins: many sensors have the effect, or few."""
 MAX_STEPS = 60
 """Most steps of the search for μ and ρ."""
 LIKELIHOOD_TOLERANCE = 1e-3
 """Change of the log likelihood below which the search ends."""
 
 
-class TypicalSet(NamedTuple):
-    """Sizes of a set of effects that explain a lot best, with one scatter.
+class Statistics(NamedTuple):
+    """What sensors tell of the parameters of an effect, turned to those that they show.
 
     Attributes
     ----------
-    odds : (s, n) array, log odds of the sensors for the subsets of the effects
-    log_likelihood : float, of sizes and shares
+    normal : (n, k, k) array, N of the sensors; 0 for one that says nothing
+    right : (n, k) array, b
+    """
+
+    normal: Array
+    right: Array
+
+
+class TypicalSize(NamedTuple):
+    """Sizes of an effect that explain a lot best, with one scatter.
+
+    Attributes
+    ----------
+    odds : (n,) array, log odds of the sensors for the effect
+    log_likelihood : float, of sizes and share
     cost : float, log of evidence over likelihood: what fitting the sizes costs
-    mean : (k,) array, μ of the parameters, side by side
-    shares : dict of effect to ρ
+    mean : (k,) array, μ
+    share : float, ρ
     """
 
     odds: Array
     log_likelihood: float
     cost: float
     mean: Array
-    shares: dict[str, float]
+    share: float
 
 
 @dataclass(frozen=True, eq=False)
-class TypeSizes:
-    """What sensors tell of the sizes that effects have in their type.
+class LotResiduals:
+    """Residuals of the sensors of a lot, in which an effect may have sizes of their type.
 
     Attributes
     ----------
-    specs : dict of effect to its setting that explains most of what the sensors have in common
-    effects : (k,) array of str, effect of each parameter
-    normal : (n, k, k) array, N of the sensors, turned to what shows, in units of the noise
-    right : (n, k) array, b
-    usual : (n,) bool array, sensors by which sizes are estimated
+    frames : n calibrations of the sensors; None for one that says nothing
+    levels : n Level, what is known of the noise of each
     """
 
-    specs: dict[str, str]
-    effects: NDArray[np.str_]
-    normal: Array
-    right: Array
-    usual: NDArray[np.bool_]
-
-    @classmethod
-    def of(
-        cls,
-        frames: Sequence[SessionFit | None],
-        shapes: Mapping[str, Sequence[str]],
-        usual: NDArray[np.bool_],
-    ) -> TypeSizes:
-        """Add up what sensors tell, in units of the noise that one or two effects leave.
-
-        Parameters
-        ----------
-        frames : calibrations of the sensors; None for one that shows nothing and is not usual
-        shapes : mapping of effects to their shapes
-        usual : as above
-        """
-        some = [frame for frame, chosen in zip(frames, usual, strict=True) if frame and chosen]
-        specs, turns = dict[str, str](), dict[str, Array]()
-        for name, tried in shapes.items():
-            parts, turned = zip(*(_shown(some, spec) for spec in tried), strict=True)
-            best = int(np.argmax(parts))
-            if turned[best].size:
-                specs[name], turns[name] = tried[best], turned[best]
-        effects = np.repeat([*turns], [turn.shape[1] for turn in turns.values()])
-        right = np.zeros((len(frames), len(effects)))
-        normal = np.zeros((*right.shape, len(effects)))
-        for i, frame in enumerate(frames if turns else ()):
-            if frame is not None:
-                each = [_derivatives(frame, specs[name])[0] @ turns[name] for name in turns]
-                a = np.concatenate(each, axis=1)
-                normal[i], right[i] = a.T @ a, frame.residuals.z @ a
-        raw = cls(specs, effects, normal, right, usual)
-        squares = sum(float(frame.residuals.z @ frame.residuals.z) for frame in some)
-        variance = raw._variance(squares, sum(frame.residuals.redundancy for frame in some))
-        return cls(specs, effects, normal / variance, right / variance, usual)
-
-    def _variance(self, squares: float, redundancy: int) -> float:
-        """Noise variance that the best one or two effects leave."""
-        left = [squares / redundancy]
-        for names in (s for r in (1, 2) for s in combinations(self.specs, r)):
-            at = np.flatnonzero(np.isin(self.effects, names))
-            b = self.right[self.usual][:, at]
-            n = self.normal[self.usual][:, at[:, None], at]
-            inverse = np.linalg.pinv(n, rcond=1e-8, hermitian=True)
-            rank = float(np.einsum("nkl,nlk->", inverse, n))
-            if redundancy - rank >= MIN_FREEDOM:
-                part = float(np.einsum("nk,nkl,nl->", b, inverse, b))
-                left.append((squares - part) / (redundancy - rank))
-        return max(min(left), 1e-12)
-
-    def of_set(self, names: Names) -> list[TypicalSet]:
-        """Sizes and shares of a set that are most probable, for each scatter; none if none show."""
-        if not names or not {*names} <= {*self.specs}:
-            return []
-        if len(names) == 1:
-            return self._singles[names[0]]
-        alone = (most_likely(self.of_set((name,))).shares for name in names)
-        return self._search_all(
-            names, [{key: share for one in alone for key, share in one.items()}]
-        )
+    frames: Sequence[SessionFit | None]
+    levels: Sequence[Level]
 
     @cached_property
-    def _singles(self) -> dict[str, list[TypicalSet]]:
-        """Sizes and shares of each effect by itself."""
-        return {n: self._search_all((n,), [{n: share} for share in SHARES]) for n in self.specs}
+    def squares(self) -> Array:
+        """Sums of squares ‖z‖², (n,)."""
+        return np.array([f.residuals.z @ f.residuals.z if f else 0.0 for f in self.frames])
 
-    def _search_all(self, names: Names, starts: Sequence[Mapping[str, float]]) -> list[TypicalSet]:
-        """Search with each scatter, with the first one from some shares."""
-        first, *others = SCATTERS
-        best = most_likely([self._search(names, shares, first) for shares in starts])
-        return [best, *(self._search(names, best.shares, τ, best.mean) for τ in others)]
+    @cached_property
+    def redundancy(self) -> Array:
+        """Degrees of freedom r, (n,)."""
+        return np.array([f.residuals.redundancy if f else 0 for f in self.frames])
 
-    def _search(
-        self, names: Names, shares: Mapping[str, float], scatter: float, mean: Array | None = None
-    ) -> TypicalSet:
-        """Search for sizes and shares with a scatter, by expectation and maximization.
+    @cached_property
+    def _noise(self) -> tuple[Array, Array, Array]:
+        """Degrees of freedom ν of the noise by the components of its level, ν + r, and a constant.
 
-        All is told for each subset s of the effects: what these have no part in is zero.
+        They have the shape (c, n); the constant is the log of what does not depend on residuals.
+        """
+        most = max(len(level.weights) for level in self.levels)
+        weights, nu = np.zeros((most, len(self.levels))), np.ones((most, len(self.levels)))
+        for i, level in enumerate(self.levels):
+            weights[: len(level.weights), i] = level.weights
+            nu[: len(level.weights), i] = level.freedoms
+        dof = nu + self.redundancy
+        constant = nu / 2 * np.log(nu) + gammaln(dof / 2) - gammaln(nu / 2)
+        with np.errstate(divide="ignore"):
+            return nu, dof, np.log(weights) + constant
+
+    def noise_density(self, squares: Array) -> tuple[Array, Array]:
+        """Log density of noise with some sums of squares, and its mean inverse variance, (n,)."""
+        nu, dof, constant = self._noise
+        each = constant - dof / 2 * np.log(nu + squares)
+        total = np.logaddexp.reduce(each)
+        return total, np.sum(np.exp(each - total) * dof / (nu + squares), axis=0)
+
+    def statistics(self, spec: str) -> Statistics:
+        """Evaluate what an effect does in the campaigns of the sensors."""
+        n, k = len(self.frames), len(get_effect(spec).parameters)
+        normal, right, total = np.zeros((n, k, k)), np.zeros((n, k)), np.zeros(k)
+        for i, frame in enumerate(self.frames):
+            with suppress(InputError):  # a column is absent
+                if frame is not None:
+                    rows = frame.rows(get_effect(spec))
+                    a = frame.residuals.project(rows)
+                    normal[i], right[i] = a.T @ a, frame.residuals.z @ a
+                    total += np.sum(rows**2, axis=0)
+        scale = np.sqrt(np.where(total > 0, total, 1.0))
+        values, vectors = np.linalg.eigh(normal.sum(axis=0) / np.outer(scale, scale))
+        seen = values > RULES.visible**2
+        turn = vectors[:, seen] / scale[:, None] / np.sqrt(values[seen] / n)
+        return Statistics(turn.T @ normal @ turn, right @ turn)
+
+    def pooled(self, told: Statistics) -> tuple[Array, float]:
+        """Size of an effect if it is equally large in all, and how much they show then, a χ² of k.
+
+        It is one whatever the noise: residuals are taken in units of what they are themselves, as
+        noise has their directions at random.
+        """
+        weights = self.redundancy / np.where(self.squares > 0, self.squares, 1.0)
+        right = weights @ told.right
+        size = _solved(np.einsum("n,nkl->kl", weights, told.normal), right)
+        return size, float(right @ size)
+
+    def p_value(self, told: Statistics) -> float:
+        """Probability that noise alone would show as much in common."""
+        return float(stats.chi2.sf(self.pooled(told)[1], told.right.shape[1]))
+
+    @cached_property
+    def p_value_of_pattern(self) -> list[float]:
+        """Probability that noise alone has as much in common, residual by residual; [] if none has.
+
+        It shows what no name explains, in sensors that were in the same positions and conditions;
+        in other ones, it shows nothing. Residuals are taken as in `pooled`.
+        """
+        each = [frame.residuals for frame in self.frames if frame]
+        n, shapes = len(each), {one.z.shape for one in each}
+        if n < 2 or len(shapes) > 1:
+            return []
+        r = each[0].redundancy
+        mean = sum(one.z / np.sqrt(max(one.variance, 1e-300)) for one in each) / np.sqrt(n)
+        shown = float(mean @ mean) / r
+        return [float(stats.f.sf(shown * (n - 1) / max(n - shown, 1e-300), r, (n - 1) * r))]
+
+    def typical(self, told: Statistics, odd: Array) -> list[TypicalSize]:
+        """Most probable sizes and share of an effect, for each scatter.
 
         Parameters
         ----------
-        names : some effects
-        shares : to begin with
-        scatter : float, τ
-        mean : (k,) array, sizes to begin with; by default as if these shares of all have them
+        told : what sensors tell of the effect
+        odd : (n,) array, log odds of each sensor to be odd, whose sizes are not those of the type
         """
-        at, usual = np.flatnonzero(np.isin(self.effects, names)), self.usual
-        of = self.effects[at] == np.array(names)[:, None]  # (e, k)
-        has = np.array([[name in some for name in names] for some in subsets_of(names)])
-        seen = has @ of  # (s, k)
-        normal = self.normal[:, at[:, None], at] * (seen[:, None, :, None] & seen[:, None, None])
-        right = self.right[:, at] * seen[:, None]
-        rho = np.array([shares[name] for name in names])
-        if mean is None:
-            whole, pulled = (a[-1, usual].sum(axis=0) for a in (normal, right))
-            mean = _solved(whole, pulled) / (rho @ of)
-        before = -np.inf
+        size, none = self.pooled(told)[0], np.full_like(odd, -np.inf)
+        starts = [(share, size / share) for share in SHARES]
+        # If sizes differ much, each sensor looks odd beside their mean.
+        without = (self._search(told, none, max(SCATTERS), *start) for start in starts)
+        starts += [(one.share, one.mean) for one in without]
+        return [
+            max((self._search(told, odd, τ, *start) for start in starts), key=_log_likelihood)
+            for τ in SCATTERS
+        ]
+
+    def _search(
+        self, told: Statistics, odd: Array, scatter: float, share: float, mean: Array
+    ) -> TypicalSize:
+        """Search for sizes and share with a scatter, by expectation and maximization.
+
+        Parameters
+        ----------
+        told, odd : as in `typical`
+        scatter : float, τ
+        share, mean : ρ and μ to begin with
+        """
+        (normal, right), k = told, told.right.shape[1]
+        nothing, before = self.noise_density(self.squares)[0], -np.inf
         for _ in range(MAX_STEPS):
-            variances = scatter**2 * (of @ mean**2 / of.sum(axis=1)) @ of
-            beside = np.eye(len(at)) + normal * variances  # I + N S
-            spread = variances[:, None] * np.linalg.inv(beside)  # (S⁻¹ + N)⁻¹
-            lost, rest = normal @ spread, right - normal @ mean
-            odds = (
-                (right + rest) @ mean
-                + np.einsum("snk,snkl,snl->sn", rest, spread, rest)
-                - np.linalg.slogdet(beside)[1]
-            ) / 2
-            prior = np.where(has, np.log(rho), np.log1p(-rho)).sum(axis=1)
-            logs = odds + prior[:, None]
+            variance = scatter**2 * float(np.mean(mean**2))
+            beside = np.eye(k) + variance * normal  # I + N S
+            spread = variance * np.linalg.inv(beside)  # (S⁻¹ + N)⁻¹
+            rest = right - normal @ mean
+            part = (right + rest) @ mean + np.einsum("nk,nkl,nl->n", rest, spread, rest)
+            density, precision = self.noise_density(np.maximum(self.squares - part, 0.0))
+            odds = density - nothing - np.linalg.slogdet(beside)[1] / 2
+            logs = np.array([np.full(len(odds), np.log1p(-share)), np.log(share) + odds, odd])
             total = np.logaddexp.reduce(logs)
-            # Weighted least squares: (N⁻¹ + S)⁻¹ = N − N (S⁻¹ + N)⁻¹ N.
-            taken = normal - lost @ normal
-            if (now := float(total[usual].sum())) < before + LIKELIHOOD_TOLERANCE:
+            if (now := float(total.sum())) < before + LIKELIHOOD_TOLERANCE:
                 break
             before = now
-            weights = np.exp(logs - total)[:, usual]
-            whole = np.einsum("sn,snkl->kl", weights, taken[:, usual])
-            b = right - np.einsum("snkl,snl->snk", lost, right)
-            rho = np.clip(weights.mean(axis=1) @ has, 0.01, 0.999)
-            mean = _solved(whole, np.einsum("sn,snk->k", weights, b[:, usual]))
-        cost = 0.0
-        for k, share in enumerate(rho.tolist(), start=1):  # sets of one come behind the empty one
-            shown = share * mean @ taken[k, usual].sum(axis=0) @ mean
-            cost += _cost_of_fitting(int(seen[k].sum()), float(shown))
-        return TypicalSet(odds, before, cost, mean, dict(zip(names, rho.tolist(), strict=True)))
+            has = np.exp(logs - total)
+            # Weighted least squares, with the noise that the effect leaves in each sensor.
+            weights = has[1] * precision
+            taken = normal - normal @ spread @ normal  # (N⁻¹ + S)⁻¹
+            whole = np.einsum("n,nkl->kl", weights, taken)
+            pulled = right - np.einsum("nkl,nlm,nm->nk", normal, spread, right)
+            mean = _solved(whole, weights @ pulled)
+            share = float(np.clip(has[1].sum() / max(has[:2].sum(), 1e-300), 0.01, 0.999))
+        return TypicalSize(odds, before, _cost_of_fitting(k, mean @ whole @ mean), mean, share)
 
 
-def subsets_of(effects: Iterable[T]) -> list[tuple[T, ...]]:
-    """Subsets of some effects, all of which a sensor may have: none, and each alone, first."""
-    given = [*effects]
-    return [s for r in range(len(given) + 1) for s in combinations(given, r)]
-
-
-def most_likely(sets: Sequence[TypicalSet]) -> TypicalSet:
-    """Return the one with the most probable sizes and shares."""
-    return max(sets, key=lambda one: one.log_likelihood)
-
-
-def _derivatives(frame: SessionFit, spec: str) -> tuple[Array, Array]:
-    """What the parameters of an effect do to the residuals z of a campaign.
-
-    Returns
-    -------
-    columns : (m, k) array, derivatives of z; zero for what it cannot show
-    squares : (k,) array, of them if no parameter of the model were estimated
-    """
-    effect, residuals = get_effect(spec), frame.residuals
-    rows = np.zeros((len(residuals.z), len(effect.parameters)))
-    with suppress(InputError):  # a column is absent
-        rows = frame.rows(effect)
-    return residuals.project(rows), np.sum(rows**2, axis=0)
-
-
-def _shown(frames: Sequence[SessionFit], spec: str) -> tuple[float, Array]:
-    """How much sensors show of an effect if it is equally large in all, and what of it shows.
-
-    Returns
-    -------
-    part : float, ‖Qᵀz‖² of all residuals as one
-    turn : (k, l) array, combinations of its parameters of which sensors tell equally much
-    """
-    columns, squares = zip(*(_derivatives(frame, spec) for frame in frames), strict=True)
-    normal = sum(each.T @ each for each in columns)
-    right = sum(one.residuals.z @ each for one, each in zip(frames, columns, strict=True))
-    total = sum(squares)
-    scale = np.sqrt(np.where(total > 0, total, 1.0))
-    values, vectors = np.linalg.eigh(normal / np.outer(scale, scale))
-    seen = values > RULES.visible**2
-    turn = vectors[:, seen] / scale[:, None] / np.sqrt(values[seen])
-    return float(np.sum((right @ turn) ** 2)), turn * np.sqrt(len(frames))
+def _log_likelihood(size: TypicalSize) -> float:
+    return size.log_likelihood
 
 
 def _solved(normal: Array, right: Array) -> Array:

@@ -1,18 +1,13 @@
 """The noise of a lot as a factor of what each campaign says of it, by made-up calibrations."""
 
-from dataclasses import replace
 from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
-import accelstudy as acs
-from accelstudy.approaches import get_approach
 from accelstudy.diagnosis.evidence.size import Level
 from accelstudy.diagnosis.rules import RULES
-from accelstudy.lots.evidence import Sensor, pose_mean, unknown_odds
-from accelstudy.lots.noise import Agreement, noises_of_lot
-from accelstudy.sensors.models import get_model
+from accelstudy.lots.noise import agreement, noises_of_lot
 
 N, REDUNDANCY = 16, 40
 QUIET, ROUGH = 3e-4, 2e-3
@@ -38,7 +33,11 @@ def fit(true, k, stated=None, within=None):
 
 
 def noises_of(fits):
-    return noises_of_lot(fits, lambda i, sigma: pytest.fail("angles alone need it"))
+    """Noise of sensors without angles, which are calibrated once."""
+    asked = []
+    noises = noises_of_lot(len(fits), lambda i, sigma: asked.append(sigma) or fits[i])
+    assert asked == [None] * len(fits)
+    return noises
 
 
 def assert_sigmas(noises, sigmas, rtol=0.03):
@@ -63,12 +62,6 @@ def test_a_wrongly_stated_sigma_changes_that_of_no_other_sensor():
     assert noises[5].freedom >= 20  # so its residuals are far beyond what it states
 
 
-def test_sensors_of_equal_noise_are_equal_whatever_they_state():
-    stated = ROUGH * np.geomspace(0.5, 2, N)[np.arange(N) * 5 % N]
-    noises = noises_of([fit(ROUGH, k, stated=u) for k, u in enumerate(stated)])
-    assert_sigmas(noises, ROUGH)
-
-
 def test_sensors_that_say_nothing_pool_only_if_they_agree():
     """What is not said cannot be wrong."""
     noises = noises_of([fit(ROUGH, k) for k in range(N)])
@@ -87,8 +80,8 @@ def test_of_several_maxima_the_highest_is_found():
     """Two groups of sensors, of which the larger one is the usual one."""
     for few in (3, 13):
         sigmas = np.where(np.arange(N) < few, QUIET, ROUGH)
-        found = Agreement.of(sigmas, np.full(N, REDUNDANCY), np.ones(N))
-        assert found.freedom == RULES.freedom_doubted or found.factor == pytest.approx(
+        factor, freedom = agreement(sigmas, np.full(N, REDUNDANCY))
+        assert freedom == RULES.freedom_doubted or factor == pytest.approx(
             QUIET if few > N / 2 else ROUGH, rel=0.1
         )
 
@@ -99,32 +92,20 @@ def test_the_noise_of_a_type_is_found_beside_an_odd_sensor(freedom):
     rng = np.random.default_rng(7)
     squares = 0.002**2 * (freedom / rng.chisquare(freedom, 400)) * rng.chisquare(12, 400) / 12
     squares[:8] *= 100
-    said = rng.choice([3e-4, 2e-3], 400)
-    noise = Agreement.of(np.sqrt(squares) * said / 0.002, np.full(400, 12), 2 * said)
-    assert noise.factor == pytest.approx(0.5, rel=0.05)
-    assert noise.freedom == pytest.approx(min(freedom, 200.0), rel=0.5)
+    factor, found = agreement(np.sqrt(squares) / 0.004, np.full(400, 12))
+    assert factor == pytest.approx(0.5, rel=0.05)
+    assert found == pytest.approx(min(freedom, 200.0), rel=0.5)
 
 
-def test_the_mean_of_a_lot_shows_what_all_sensors_have():
-    """A thermal bias that is too small for one sensor."""
+def test_beside_angles_the_noise_of_the_forces_is_searched_for():
+    """Residuals have a part of the angles, which is known and no noise of the forces."""
+    true, of_angles = 3 * ROUGH, ROUGH
 
-    def lot(effect, n=6):
-        campaigns = [
-            acs.simulate_campaign(name=f"s{i}", seed=100 + i, temperature=(15, 35), effects=effect)
-            for i in range(n)
-        ]
-        return [Sensor(c, get_model("bias-scale-nonorthogonality"), get_approach("robot"), i)
-                for i, c in enumerate(campaigns)]  # fmt: skip
+    def calibrated(i, sigma):
+        taken = ROUGH if sigma is None else sigma
+        ratio = np.sqrt((true**2 + of_angles**2) / (taken**2 + of_angles**2))
+        one = fit(taken * ratio, i, stated=taken)
+        one.solution.approach.uses_angles = True
+        return one
 
-    def posed(sensors):
-        return pose_mean(sensors, [sensor.evidence() for sensor in sensors])
-
-    assert posed(lot(())).detection.p_value > 0.01
-    small = lot(("thermal_bias: 1e-4, -1e-4, 1e-4",))
-    mean = posed(small)
-    assert mean.detection.p_value < 1e-3
-    odds = unknown_odds(mean, 0.0)
-    assert max(odds, key=odds.get) == "unknown(temperature → bias)"
-    # There is none of sensors in different positions.
-    turned = [replace(one, campaign=one.campaign.with_arrays(time=None)) for one in small[:1]]
-    assert posed([*turned, *small[1:3]]) is None
+    assert_sigmas(noises_of_lot(N, calibrated), true)

@@ -11,7 +11,7 @@ import accelstudy as acs
 from accelstudy.approaches import get_approach
 from accelstudy.campaign.format import read_campaign, write_campaign
 from accelstudy.lots.evidence import Sensor
-from accelstudy.lots.sizes import TypeSizes
+from accelstudy.lots.sizes import LotResiduals
 from accelstudy.lots.type_file import TypeParameter
 from accelstudy.sensors.models import get_model
 
@@ -23,12 +23,12 @@ def test_a_campaign_that_does_not_determine_the_model_says_nothing():
         acs.simulate_campaign(scheme=scheme, temperature=(15, 35))
         for scheme in ("faces-6", "mclaren-24")
     )
-    silent = Sensor(few, None, get_approach("gravity")).evidence()
+    silent = Sensor(few, get_model("bias-scale-nonorthogonality"), get_approach("gravity"))
+    silent = silent.evidence()
     assert (silent.odds, silent.p_value) == ({}, 1.0)
     loud = Sensor(one, get_model("bias-scale"), get_approach("gravity")).evidence()
-    shapes, frames = {"thermal_bias": ["thermal_bias"]}, [silent.frame, loud.frame]
-    sizes = TypeSizes.of(frames, shapes, np.array([False, True]))
-    assert [*sizes.right.any(axis=1)] == [False, True]
+    residuals = LotResiduals([silent.frame, loud.frame], [loud.base.level] * 2)
+    assert [*residuals.statistics("thermal_bias").right.any(axis=1)] == [False, True]
 
 
 def over_sensors(values, sigmas, odd=()):

@@ -131,7 +131,8 @@ def _lot():
     each = [SensorEvidence(c, 1e-9, {name: 20.0}, classes=((name,),)) for c in "abc"]
     sensors = (SimpleNamespace(noise=None),) * len(each)
     one, model = Pass(sensors, tuple(each)), get_model("bias-scale")
-    lot = LotDiagnosis((one, one), model, tuple(one.found))
+    assert one.found is not None
+    lot = LotDiagnosis((one, one), model, (one.found,))
     return Lot(lot, model, {}, {}, {}).content
 
 
