@@ -121,7 +121,7 @@ class Mixture:
     def wrong(self) -> float:
         """Posterior that the model lacks anything, or that a sensor is odd."""
         right = (1 - sum(self.posterior.values())) * np.prod(1 - self.nothing.odd)
-        return float(max(1 - right, 1e-300))
+        return max(float(1 - right), 1e-300)
 
     def share(self, name: str) -> tuple[float, float, float]:
         """Share of the sensors that have an effect: mean, and the interval that holds 95 %."""

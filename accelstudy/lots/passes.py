@@ -62,7 +62,8 @@ class LotEffect(NamedTuple):
     share : float, of the sensors
     share_ci95 : tuple of two floats
     spec : str, the effect in the setting that explains most; None of what is no effect
-    specs : (n,) tuple of str, that of each sensor: what is sudden has a time of its own
+    specs : (n,) tuple of str, that of each sensor: what is sudden has a time of its own; empty of
+        what is no effect
     having : (n,) array, posterior of each sensor to have it
     """
 
@@ -254,8 +255,10 @@ class Pass:
                 counted[specs[first]] += weight
         usual = max(counted, key=counted.__getitem__, default=None)
         spec = self._best.get(first, usual)
-        sudden = spec is not None and get_effect(spec).sudden
-        own = tuple(specs.get(first, spec) if sudden else spec for specs in each)
+        own: tuple[str, ...] = ()
+        if spec is not None:
+            sudden = get_effect(spec).sudden
+            own = tuple(specs.get(first, spec) if sudden else spec for specs in each)
         return LotEffect(members, min(posterior, 1.0), share, (low, high), spec, own, having)
 
     @cached_property
