@@ -88,7 +88,7 @@ def test_the_next_position_is_worth_more_than_others(begun):
 
     def after(direction):
         """Mean variance of roll and pitch with one position more, without noise."""
-        observed = before.observed
+        observed = before.solution.observed
         force = model.sense(-before.gravity * direction[None], before.parameters)
         more = np.concatenate([observed.forces, force[None]], axis=1)
         result = calibrate(
