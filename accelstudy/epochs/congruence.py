@@ -19,7 +19,6 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cache, cached_property
-from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -27,6 +26,7 @@ from scipy import optimize, special, stats
 from scipy.stats import qmc
 
 from accelstudy.adjustment.quality import noncentrality
+from accelstudy.epochs.file_format import Test
 from accelstudy.positions.choice import first_best
 
 Array = NDArray[np.float64]
@@ -41,28 +41,6 @@ MANY = 1e9
 """Degrees of freedom from which on they are infinite."""
 STATISTIC_TOLERANCE = 1e-9
 """Relative difference below which two statistics are equal, and the first one is taken."""
-
-
-class Test(NamedTuple):
-    """Whether epochs differ by no more than their covariance matrices say.
-
-    Attributes
-    ----------
-    statistic : float, weighted squares / f
-    dof : (f, ν), of F; ν is infinite with stated noise
-    p_value : float
-    level : float
-    """
-
-    statistic: float
-    dof: tuple[int, float]
-    p_value: float
-    level: float = LEVEL
-
-    @property
-    def congruent(self) -> bool:
-        """Whether the epochs are compatible with no change."""
-        return self.p_value >= self.level
 
 
 @dataclass(frozen=True)
@@ -87,16 +65,21 @@ class Congruence:
 
     @cached_property
     def test(self) -> Test:
-        """Test of congruence."""
+        """Whether epochs differ by no more than their covariance matrices say."""
+        f, nu = self.freedom
+        statistic = self._squares / f if f else 0.0
+        p_value = f_tail(statistic, f, nu) if f else 1.0
+        return Test(statistic=statistic, dof=[f, nu], p_value=p_value, level=LEVEL)
+
+    @cached_property
+    def freedom(self) -> tuple[int, float]:
+        """Degrees of freedom f and ν of F; ν is infinite with stated noise."""
         n, p = self.estimates.shape
         if not p:
-            return Test(0.0, (0, np.inf), 1.0)
-        _, projector = self._about_the_mean
-        f, parts = (n - 1) * p, projector.reshape(n, p, n, p)
+            return 0, np.inf
+        parts = self._about_the_mean[1].reshape(n, p, n, p)
         means = np.einsum("iaia->i", parts)
-        nu = dof_of_squares(means, np.einsum("iajb->ij", parts**2), self.dof)
-        statistic = self._squares / f
-        return Test(statistic, (f, nu), f_tail(statistic, f, nu))
+        return (n - 1) * p, dof_of_squares(means, np.einsum("iajb->ij", parts**2), self.dof)
 
     @cached_property
     def _about_the_mean(self) -> tuple[Array, Array]:
@@ -148,7 +131,7 @@ class Congruence:
         ----------
         course : (n,) array, change of the parameter in each epoch, in parts of its size
         """
-        (f, nu), (roots, projector) = self.test.dof, self._about_the_mean
+        (f, nu), (roots, projector) = self.freedom, self._about_the_mean
         shown = np.einsum("n,nij->nij", np.asarray(course, dtype=float), roots)
         columns = shown.reshape(len(projector), -1)
         each = np.einsum("ik,ij,jk->k", columns, projector, columns)

@@ -16,7 +16,6 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
-from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -25,45 +24,12 @@ from scipy import stats
 from accelstudy.adjustment.random_effects import RandomEffects
 from accelstudy.basics.shares import sigmas_95
 from accelstudy.epochs.congruence import LEVEL, dof_of_squares, f_tail
+from accelstudy.epochs.file_format import Rate, Scatter
 
 Array = NDArray[np.float64]
 
 YEAR = 365.25 * 86400.0
 """s"""
-
-
-class Rate(NamedTuple):
-    """A rate per year, with its sigma, which has some degrees of freedom."""
-
-    per_year: float
-    sigma: float
-    dof: int
-
-    @property
-    def ci95(self) -> tuple[float, float]:
-        """Interval that holds the rate with a probability of 95 %."""
-        half = sigmas_95(self.dof) * self.sigma
-        return self.per_year - half, self.per_year + half
-
-    @property
-    def p_value(self) -> float:
-        """Probability of a larger estimate where there is no rate."""
-        return 2 * float(stats.t.sf(abs(self.per_year) / self.sigma, self.dof))
-
-
-class Scatter(NamedTuple):
-    """Scatter from session to session.
-
-    Attributes
-    ----------
-    sd : float
-    ci95 : tuple of two floats, its 95 % interval
-    p_value : float, probability that noise alone leaves such squares about the line
-    """
-
-    sd: float
-    ci95: tuple[float, float]
-    p_value: float
 
 
 @dataclass(frozen=True, eq=False)
@@ -90,11 +56,13 @@ class ParameterCourse:
         design = np.column_stack([np.ones_like(self.years), self.years])
         return RandomEffects(self.values, self.variances, design)
 
-    @property
+    @cached_property
     def rate(self) -> Rate:
         """Rate per year, if sessions are independent."""
-        variance = self.line.covariance[1, 1]
-        return Rate(float(self.line.estimates[1]), float(np.sqrt(variance)), self.line.dof)
+        rate, sigma = float(self.line.estimates[1]), float(np.sqrt(self.line.covariance[1, 1]))
+        half = sigmas_95(self.line.dof) * sigma
+        p_value = 2 * float(stats.t.sf(abs(rate) / sigma, self.line.dof))
+        return Rate(per_year=rate, sigma=sigma, ci95=[rate - half, rate + half], p_value=p_value)
 
     @cached_property
     def scatter(self) -> Scatter:
@@ -104,10 +72,11 @@ class ParameterCourse:
         left = np.eye(len(root)) - smooth
         nu = dof_of_squares(np.diag(left), left**2, self.dof, self.level)
         p_value = f_tail(line.squares(0.0) / line.dof, line.dof, nu)
-        return Scatter(line.scatter, line.scatter_interval(), p_value)
+        return Scatter(sd=line.scatter, ci95=[*line.scatter_interval()], p_value=p_value)
 
     @property
     def found(self) -> tuple[str, ...]:
         """What a parameter that changed does, in words; "changed" if that is not sure."""
         named = {"drifts": self.rate.p_value, "scatters": self.scatter.p_value}
-        return tuple(word for word, p in named.items() if p <= self.level) or ("changed",)
+        found = (word for word, p in named.items() if p is not None and p <= self.level)
+        return tuple(found) or ("changed",)

@@ -42,6 +42,11 @@ class Test(Part):
     p_value: float
     level: float
 
+    @property
+    def congruent(self) -> bool:
+        """Whether the calibrations are compatible with no change."""
+        return self.p_value >= self.level
+
 
 class Rate(Part):
     """Its drift, per year.

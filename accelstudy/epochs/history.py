@@ -22,9 +22,9 @@ from accelstudy.basics.wording import comma_list, estimate, plural
 from accelstudy.campaign.calibration.sensor_calibration import SensorCalibration
 from accelstudy.drawing.saving import save_all
 from accelstudy.drawing.style import FULL, INK, group_colour, group_of, new_figure, symbol
-from accelstudy.epochs.congruence import LEVEL, Congruence, Test
+from accelstudy.epochs.congruence import LEVEL, Congruence
 from accelstudy.epochs.course import YEAR, ParameterCourse
-from accelstudy.epochs.file_format import Calibration, HistoryDocument, Parameter, Tilt
+from accelstudy.epochs.file_format import Calibration, HistoryDocument, Parameter, Test, Tilt
 from accelstudy.epochs.interval import Interval
 from accelstudy.files.outputs import HISTORY
 from accelstudy.leveling.error import ATTITUDES, TiltError, cap_forces, tilt_error

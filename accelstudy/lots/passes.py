@@ -21,6 +21,7 @@ from accelstudy.effects import get_effect
 from accelstudy.lots.evidence import NOISE_PRIORS, Sensor, SensorEvidence, lot_classes
 from accelstudy.lots.mixture import Mixture, log_odd
 from accelstudy.lots.sizes import LotResiduals, Statistics
+from accelstudy.lots.type_file import TypeParameter
 
 Array = NDArray[np.float64]
 Mapped: TypeAlias = Callable[..., Iterator[Any]]
@@ -44,8 +45,6 @@ MAX_NAMES = 3
 EFFECT = "effect"
 WEIGHTS = {EFFECT: 1.0, UNKNOWN: RULES.prior_unknown, **NOISE_PRIORS}
 """Prior weights of what the model of a lot may lack, relative to one effect of the catalogue."""
-OF_SENSORS = ("specs", "having")
-"""What an effect of the lot has for each sensor."""
 ODD = "odd"
 """Name of an effect that one sensor has, and neither the model nor the other sensors."""
 MIN_HAVING = 0.5
@@ -65,6 +64,7 @@ class LotEffect(NamedTuple):
     specs : (n,) tuple of str, that of each sensor: what is sudden has a time of its own; empty of
         what is no effect
     having : (n,) array, posterior of each sensor to have it
+    parameters : its sizes, once the sensors are calibrated with it
     """
 
     names: tuple[str, ...]
@@ -74,11 +74,7 @@ class LotEffect(NamedTuple):
     spec: str | None
     specs: tuple[str, ...]
     having: Array
-
-    @property
-    def statement(self) -> dict[str, Any]:
-        """What is said of it for the lot as a whole."""
-        return {key: getattr(self, key) for key in self._fields if key not in OF_SENSORS}
+    parameters: Sequence[TypeParameter] = ()
 
     def is_one_of(self, effects: Sequence[LotEffect]) -> bool:
         """Whether one of some effects has the same most probable name."""
@@ -93,11 +89,20 @@ class Alternative(NamedTuple):
 
 
 class SensorState(NamedTuple):
-    """What the model lacks for a sensor, or what makes it odd, and how probable that is."""
+    """What the model lacks for a sensor, or what makes it odd, and how probable that is.
+
+    Attributes
+    ----------
+    campaign : str
+    names : tuple of str
+    posterior : float
+    failed : str, why it has no calibration with the model of the type; None if it has one
+    """
 
     campaign: str
     names: tuple[str, ...]
     posterior: float
+    failed: str | None = None
 
 
 @dataclass(frozen=True, eq=False)

@@ -25,10 +25,15 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 from scipy import stats
-from scipy.special import gammaln
 
 from accelstudy.basics.errors import InputError
-from accelstudy.diagnosis.evidence.size import SIZE_WEIGHTS, SIZES, Level, log_mean
+from accelstudy.diagnosis.evidence.size import (
+    SIZE_WEIGHTS,
+    SIZES,
+    Evidence,
+    Level,
+    log_mean,
+)
 from accelstudy.diagnosis.rules import RULES
 from accelstudy.diagnosis.space.frame import SessionFit
 from accelstudy.effects import get_effect
@@ -102,27 +107,23 @@ class LotResiduals:
         return np.array([f.residuals.redundancy if f else 0 for f in self.frames])
 
     @cached_property
-    def _noise(self) -> tuple[Array, Array, Array]:
-        """Degrees of freedom ν of the noise by the components of its level, ν + r, and a constant.
-
-        They have the shape (c, n); the constant is the log of what does not depend on residuals.
-        """
-        most = max(len(level.weights) for level in self.levels)
-        weights, nu = np.zeros((most, len(self.levels))), np.ones((most, len(self.levels)))
-        for i, level in enumerate(self.levels):
-            weights[: len(level.weights), i] = level.weights
-            nu[: len(level.weights), i] = level.freedoms
-        dof = nu + self.redundancy
-        constant = nu / 2 * np.log(nu) + gammaln(dof / 2) - gammaln(nu / 2)
-        with np.errstate(divide="ignore"):
-            return nu, dof, np.log(weights) + constant
+    def _evidence(self) -> dict[Evidence, list[int]]:
+        """Sensors of equal redundancy of whose noise equally much is known, by their numbers."""
+        alike: dict[Evidence, list[int]] = {}
+        for i, known in enumerate(zip(self.levels, self.redundancy.tolist(), strict=True)):
+            alike.setdefault(Evidence(*known), []).append(i)
+        return alike
 
     def noise_density(self, squares: Array) -> tuple[Array, Array]:
         """Log density of noise with some sums of squares, and its mean inverse variance, (n,)."""
-        nu, dof, constant = self._noise
-        each = constant - dof / 2 * np.log(nu + squares)
-        total = np.logaddexp.reduce(each)
-        return total, np.sum(np.exp(each - total) * dof / (nu + squares), axis=0)
+        density, precision = np.zeros((2, len(squares)))
+        for evidence, some in self._evidence.items():
+            each = evidence.noise_density(squares[some])
+            density[some] = np.logaddexp.reduce(each, axis=1)
+            nu = np.array(evidence.level.freedoms)
+            inverse = (nu + evidence.redundancy) / (nu + squares[some, None])
+            precision[some] = np.sum(np.exp(each - density[some, None]) * inverse, axis=1)
+        return density, precision
 
     def statistics(self, spec: str) -> Statistics:
         """Evaluate what an effect does in the campaigns of the sensors."""
