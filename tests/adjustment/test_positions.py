@@ -161,7 +161,7 @@ def frame(request):
     )  # fmt: skip
     gravity = {"value_mps2": campaign.gravity, "sigma_mps2": 1e-3}
     fit = fit_campaign(campaign.with_header(gravity=gravity), NINE, get_approach(request.param))
-    return SessionFit.of(solve(NINE, fit.approach, fit.observed, fit.adjustment))
+    return SessionFit.of(fit.solution)
 
 
 def test_residuals_are_those_of_a_basis_of_the_residual_space(frame):
