@@ -14,8 +14,8 @@ if TYPE_CHECKING:
     from accelstudy.leveling.distribution import Tilt
     from accelstudy.planning.simulated import SimulatedTilt
 
-HOLDS = (1.0, 2.0, 5.0, 10.0, 20.0, 30.0, 60.0, 120.0)
-"""Durations of a hold that are tried, s."""
+HOLDS = (5.0, 10.0, 20.0, 30.0, 60.0, 120.0)
+"""Durations of a hold that are tried, s; `import` finds none in a rest of less than 2.4 s."""
 USUAL_HOLD = 10.0
 """s, for a sensor of which only the noise of a position is known."""
 HOW = {"gravity": "by hand", "robot": "with a robot"}

@@ -64,6 +64,8 @@ AROUND = {
     # Neither numbers in notes nor the blanks of a column of words tell the delimiter.
     "notes above": ([*NOTES, "// 50 Hz by 3 axes on 1 board in 26 positions", *SPARSE],
                     "forces from ax, ay, az"),
+    "commas in quotation marks": (rows_of(table().astype(str).map(lambda x: x.replace(".", ","))),
+                                  "forces from ax, ay, az"),
     "words": (rows_of(table(note=["say, 0"] * N), sep="\t"), "forces from ax, ay, az"),
 }  # fmt: skip
 
@@ -199,6 +201,35 @@ def test_dates_and_clocks_are_a_column_of_time(tmp_path, case):
         assert_timed(found(tmp_path / "log.parquet"))
 
 
+def test_dates_that_do_not_tell_month_and_day_apart_are_named(tmp_path):
+    frame = table(plain("%m/%d/%Y %H:%M:%S.%%"), names=("when", "ax", "ay", "az"))
+    said = refusal("import", written(tmp_path, rows_of(frame)), "--out", tmp_path / "out")
+    assert "column when: dates as 3/1/2024" in said
+
+
+def test_a_rate_that_the_times_contradict_is_told():
+    dated = table(time=START + pd.to_timedelta(TIME, "s"))
+    named = table(names=("t_ms", "ax", "ay", "az"), time=1e3 * TIME)
+    for frame, name in ((dated, "t"), (named, "t_ms")):
+        wrong, right = (acs.find_holds(frame, rate=rate) for rate in (60, HAND_RATE))
+        assert f"column {name} tells 50 samples per second, and `rate` 60 was taken" in said(wrong)
+        assert "samples per second, and" not in said(right)
+
+
+def test_gravity_is_told_and_is_that_of_the_earth():
+    usual, typed = acs.find_holds(table()), acs.find_holds(table(), gravity=9.08795)
+    assert "gravity: 9.80665 m/s², as none was given" in usual.notes
+    assert "gravity: 9.08795 m/s²" in typed.notes
+    assert "no place on Earth" in said(typed)
+    assert "no place on Earth" not in said(usual)
+
+
+def test_a_word_between_the_numbers_of_a_table_in_memory():
+    frame = table().astype(object)
+    frame.iloc[IN_HOLD, 1] = "x"
+    assert "row 131, column ax (fx): 'x'" in said(found(frame))
+
+
 @pytest.mark.parametrize("index", ["dates", "zone", "durations"])
 def test_a_table_in_memory_has_the_time_of_its_index(index):
     times = {"dates": START + pd.to_timedelta(TIME, "s"), "durations": pd.to_timedelta(TIME, "s")}
@@ -321,6 +352,19 @@ def test_a_slow_log_has_longer_windows():
     """At 5 Hz a second has too few samples for a variance."""
     slow = np.concatenate([np.repeat(FORCES[i : i + 150 : 3], 2, axis=0) for i in range(0, N, 150)])
     found(table(time=np.arange(len(slow)) / 5, forces=slow))
+
+
+def test_rests_that_are_shorter_than_a_hold_are_not_replaced_by_slow_moves():
+    """Between turns of 5 s the sensor rests for 1 s, which is no more than a window."""
+    rng, rests = np.random.default_rng(3), np.vstack([np.eye(3), -np.eye(3)] * 2)
+    parts = []
+    for one, next_one in zip(rests, np.roll(rests, -1, axis=0), strict=True):
+        way = (1 - np.cos(np.linspace(0, np.pi, 500)))[:, None] / 2
+        turn = one + (next_one - one) * way + rng.normal(0, 0.05, (500, 3)).cumsum(axis=0) / 22
+        parts += [np.tile(one, (100, 1)), turn]
+    forces = G * np.concatenate(parts) + rng.normal(0, 0.003, (len(parts) * 300, 3))
+    with refused("the sensor was never still", "like a hand"):
+        acs.find_holds(pd.DataFrame(forces, columns=["x", "y", "z"]), rate=100)
 
 
 @pytest.mark.parametrize("rate", [None, 100], ids=["untimed", "short"])

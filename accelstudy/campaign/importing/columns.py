@@ -188,7 +188,7 @@ def _find(raw: RawTable, key: str, column: Place | None = None) -> int | None:
     """
     names, by_text = raw.names, raw.named and isinstance(column, str)
     if column is None:
-        places = places_by_name(names, key) or (sorted(raw.dates) if key == "time" else [])
+        places = time_columns(raw) if key == "time" else places_by_name(names, key)
     elif by_text and column in names:
         if names.count(str(column)) > 1:
             raise InputError(f"{raw.path}: {key}: there are several columns {column!r}")
@@ -250,6 +250,11 @@ def places_by_name(names: Sequence[str], key: str) -> list[int]:
         if len(found) == 1:
             break
     return found
+
+
+def time_columns(raw: RawTable) -> list[int]:
+    """Places of the columns that may be the time: by their names, else those of dates."""
+    return places_by_name(raw.names, "time") or sorted(raw.dates)
 
 
 def thermometers(names: Sequence[str]) -> list[int]:

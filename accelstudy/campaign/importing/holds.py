@@ -47,6 +47,9 @@ MAX_WANDER = 2.0
 """A hold whose standard deviation is more than this many thresholds of a window is none."""
 SATURATED = "the sensor is saturated there"
 TURNS = "the force changes there by more than its noise, since the sensor turns slowly"
+QUIET_RATIO = 10.0
+"""Noise floor of what looks like rest, as a multiple of the noise of the quietest windows, from
+which on it is motion: those are in rests that are shorter than a hold."""
 SLOW_RATIO, QUICK_RATIO = 2.0, 0.2
 """Allan deviation, as a multiple of that of white noise, from which on a motion is slow, such as
 that of a hand; seconds, below which motions are vibrations, which do not harm a mean."""
@@ -327,8 +330,8 @@ def _holds_of(
     holds = Holds(log, windows, table, noise, tuple(warnings), size)
     if _moves(holds, records):
         why = (
-            f"what looks like rest varies by {windows.floor:.3g} m/s², slowly like a hand, not "
-            "like the noise of a sensor"
+            f"what looks like rest varies by {windows.floor:.3g} m/s², like a hand, not like the "
+            "noise of a sensor"
         )
         raise _never_still(log, windows, why, size)
     return holds
@@ -338,10 +341,14 @@ def _moves(holds: Holds, records: Sequence[Array]) -> bool:
     """Whether the windows "at rest" show motion: large compared with gravity, and slow.
 
     The noise of a sensor at rest is below a few hundredths of gravity. The vibration of a machine
-    may be larger, but it is quick and averages out like white noise. A human body moves slowly.
+    may be larger, but it is quick and averages out like white noise. A human body moves slowly, and
+    some windows between its moves are much quieter.
     """
-    if not holds.windows.floor > MAX_REST_NOISE * min(holds.radius, STANDARD_GRAVITY):
+    floor = holds.windows.floor
+    if not floor > MAX_REST_NOISE * min(holds.radius, STANDARD_GRAVITY):
         return False
+    if floor > QUIET_RATIO * _quietest(holds.windows):
+        return True
     sd = float(np.sqrt(np.mean(holds.noise.sd**2)))
     if sd == 0:  # all samples of a coarse sensor are rounded alike
         return False
@@ -359,9 +366,13 @@ def _never_still(log: Log, windows: Windows, why: str, size: int | None = None) 
             f"{log.path}: blocks of {size} samples are no positions: {why}; is the number of "
             "samples (`block`) right, or does a file hold a move?"
         )
-    least = np.sqrt(np.nanquantile(windows.variance, 0.01))
     return InputError(
         f"{log.path}: the sensor was never still: {why}; the quietest hundredth of its windows of "
-        f"{windows.width * log.step:.2g} s varies by {least:.3g} m/s². Lay it down for some "
-        "seconds in each of ten or more attitudes, on a table or in a fixture"
+        f"{windows.width * log.step:.2g} s varies by {_quietest(windows):.3g} m/s². Lay it down "
+        "for some seconds in each of ten or more attitudes, on a table or in a fixture"
     )
+
+
+def _quietest(windows: Windows) -> float:
+    """Standard deviation of the quietest hundredth of the windows, m/s²."""
+    return float(np.sqrt(np.nanquantile(windows.variance, 0.01)))

@@ -24,6 +24,8 @@ from accelstudy.campaign.importing.columns import (
     CONDITIONS,
     MEANS,
     resolve_layout,
+    time_columns,
+    unit_in,
     which_column,
 )
 from accelstudy.campaign.importing.formats import read_table, table_in_memory
@@ -42,6 +44,9 @@ MAX_NAMED = 3
 """Rows that are named of those left out."""
 GAP_RATIO = 5.0
 """A step of time that is this many times the usual one is a gap."""
+MAX_RATE_ERROR = 0.05
+"""Relative difference between a given rate and that of a column of time, from which on it is
+told."""
 _USUAL_RATE = 100.0
 """1/s; of several units of time the likely one gives the rate nearest to it."""
 
@@ -131,7 +136,7 @@ class Log:
         """What could not be read."""
         if self.parts:
             return [line for part in self.parts for line in part.warnings()]
-        said = [*self.raw.warnings]
+        said = [*self.raw.warnings, *self._contradicted_rate()]
         if self.lost.any():
             rows = np.flatnonzero(self.lost)
             each = "; ".join(self.describe(row) for row in rows[:MAX_NAMED].tolist())
@@ -142,10 +147,29 @@ class Log:
             )
         return said
 
+    def _contradicted_rate(self) -> list[str]:
+        """Say that a column of time tells another rate than the one that was given."""
+        raw, rate, said = self.raw, self.layout.rate, []
+        for place in time_columns(raw) if rate is not None else ():
+            unit = "ns" if place in raw.dates else unit_in(raw.names[place], "time")
+            times = raw.nanoseconds(place) if place in raw.dates else raw.numbers(place)
+            step = UNITS["s"][unit or "s"] * np.median(np.diff(_counted_from_first(times)[0]))
+            if unit and step > 0 and abs(step * rate - 1) > MAX_RATE_ERROR:
+                said.append(
+                    f"column {raw.names[place]} tells {1 / step:.6g} samples per second, and "
+                    f"`rate` {rate:g} was taken"
+                )
+        return said
+
     # --- what holds are looked for in ------------------------------------------------------------
 
     def check_timed(self) -> None:
         """Raise `InputError` unless something tells the times of the samples."""
+        if not self.timed and (unclear := self.raw.unclear_dates):
+            raise InputError(
+                f"{self.path}: column {unclear[0]}: dates as 3/1/2024 do not tell month and day "
+                "apart; write 2024-03-01, or give the rate (`rate`)"
+            )
         if not self.timed:
             raise InputError(
                 f"{which_column(self.raw, 'time')}; give the column of time (`time`), or the rate "

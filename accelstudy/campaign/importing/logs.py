@@ -14,7 +14,7 @@ from accelstudy.basics.arguments import tidy
 from accelstudy.basics.bounds import SIGMA_FORCE
 from accelstudy.basics.errors import InputError
 from accelstudy.basics.units import MGON, UNITS, display_unit, to_display
-from accelstudy.campaign.gross_errors.recognition import check_plausible
+from accelstudy.campaign.gross_errors.recognition import check_plausible, check_size
 from accelstudy.campaign.header import LogLayout
 from accelstudy.campaign.importing.columns import ANGLES, MEANS, SDS, thermometers
 from accelstudy.campaign.importing.holds import Holds, find_blocks, find_holds
@@ -35,6 +35,8 @@ MAX_ACROSS_RATIO = 1.5
 """Noise across gravity, as a multiple of that along it, from which on a warning says that the
 sensor turns within its holds."""
 _YEARS = 1e8  # s; no session lasts for years, so later times count from 1970
+_ON_EARTH = 9.76, 9.84
+"""Gravity, m/s², with some room: from the highest mountain on the equator to the poles."""
 MIN_ROUNDING_RATIO = 0.1
 """Sigma of rounding over that of noise, from which on the resolution is told and kept."""
 
@@ -199,6 +201,9 @@ def _campaign_of_holds(
         angles_for = reference.angles_for(holds, offset, settings.gravity)
         holds, columns["angles"], sensor, note = angles_for
     table, noise = holds.table, holds.noise
+    # Before a header refuses the noise of such forces.
+    where, forces = f"{log.path}", holds.means - offset
+    check_size(where, forces, settings.gravity, layout.unit, layout.conversion)
     rounded = noise.rounding > MIN_ROUNDING_RATIO * noise.accuracy.allan
     if log.has_one_clock and ("time" in log.places or holds.size is None):
         columns["time"] = ((table["t0"] + table["t1"]) / 2).to_numpy()
@@ -214,7 +219,7 @@ def _campaign_of_holds(
     campaign = Campaign.of(
         header,
         positions=table.index.to_numpy(),
-        forces=holds.means - offset,
+        forces=forces,
         n_samples=table["n"].to_numpy(),
         sd=table[[*SDS]].to_numpy(),
         **columns,
@@ -252,7 +257,16 @@ def _header(log: Log, settings: ImportSettings, layout: LogLayout) -> dict[str, 
 def _checked(campaign: Campaign, log: Log, settings: ImportSettings) -> Campaign:
     """Refuse forces nowhere near gravity and angles in another unit; add what is doubtful."""
     doubts = check_plausible(campaign, f"{log.path}", settings.robot_unit)
-    return replace(campaign, warnings=(*campaign.warnings, *doubts))
+    given = "gravity" in settings.model_fields_set
+    note = f"gravity: {campaign.gravity:.9g} m/s²{'' if given else ', as none was given'}"
+    least, most = _ON_EARTH
+    if not least <= campaign.gravity <= most:
+        doubts.append(
+            f"a gravity of {campaign.gravity:.9g} m/s² is that of no place on Earth, from {least} "
+            f"to {most}; check `gravity`"
+        )
+    warnings = (*campaign.warnings, *doubts)
+    return replace(campaign, notes=(*campaign.notes, note), warnings=warnings)
 
 
 # --- What is said of it --------------------------------------------------------------------------

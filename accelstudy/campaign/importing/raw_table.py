@@ -25,6 +25,7 @@ _SAMPLED_CELLS = 1000
 """Cells of a column among which the first that is not empty tells whether it has dates."""
 _CLOCK = r"\d{1,2}:\d\d(:\d\d([.,:]\d+)?)?"
 _ISO = r"\d{4}-?\d\d-?\d\d[T ]\d\d(:?\d\d.*)?"
+_US_DAY = re.compile(r"\d{1,2}/\d{1,2}/\d{4}\b.*")
 _DAY = r"(\d{4}(?P<of>[-/.])\d{1,2}(?P=of)\d{1,2}|\d{1,2}\.\d{1,2}\.\d{4})"
 _STAMP = re.compile(rf"\s*({_ISO}|{_DAY}[T ]+{_CLOCK}|{_CLOCK})\s*")
 """The order of day and month is plain in 31.1.2024, but not in 3/1/2024."""
@@ -69,6 +70,12 @@ class RawTable:
         """Places of columns of dates with times, or of times of a day."""
         columns = enumerate(self.content.columns)
         return {i for i, column in columns if pa.types.is_timestamp(column.type) or _dated(column)}
+
+    @cached_property
+    def unclear_dates(self) -> list[str]:
+        """Names of columns of dates as 3/1/2024, in which month and day are not told apart."""
+        first = (_first_cell(column) for column in self.content.columns)
+        return [n for n, cell in zip(self.names, first, strict=True) if _US_DAY.match(cell)]
 
     def table(self, as_written: bool = False) -> pa.Table:
         """Return the columns by unique names: `column_0` … of a table without names.
@@ -132,8 +139,13 @@ class RawTable:
 
 def _dated(column: pa.ChunkedArray) -> bool:
     """Whether the first cell that is not empty is a date with a time, or a time of day."""
-    firsts = (str(cell) for cell in column.slice(0, _SAMPLED_CELLS).to_pylist() if cell is not None)
-    return _STAMP.fullmatch(next(filter(None, firsts), "")) is not None
+    return _STAMP.fullmatch(_first_cell(column)) is not None
+
+
+def _first_cell(column: pa.ChunkedArray) -> str:
+    """Return the first cell of a column that is not empty; nothing if there is none."""
+    cells = (str(cell) for cell in column.slice(0, _SAMPLED_CELLS).to_pylist() if cell is not None)
+    return next(filter(None, cells), "")
 
 
 @contextmanager

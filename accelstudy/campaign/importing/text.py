@@ -33,8 +33,8 @@ _BLOCK = 2**22  # bytes that hold any line
 _COMMENTS = ("#", "%", "//", ";")
 _NO_READING = ("", "-", "--", "nan", "na", "n/a", "null", "none")
 _NULLS = [each for cell in _NO_READING for each in {cell, cell.upper(), cell.title(), "NaN", "N/a"}]
-_LAYOUTS = ((",", "."), *product((";", "\t", "|", None), ".,"))
-"""Delimiters, None for blanks, with decimal marks."""
+_LAYOUTS = ((",", "."), *product((";", "\t", "|", None), ".,"), (",", ","))
+"""Delimiters, None for blanks, with decimal marks; both commas if cells are in quotation marks."""
 _LABEL = re.compile(rb"(?<![\w.])([A-Za-z_]\w*)[ \t]*[:=][ \t]*(?=[-+.\d])")
 """Name of the number that follows, as in ``ax: 0.12`` or ``ax=0.12``."""
 _DECIMAL_COMMA = r"^([+-]?[0-9]*),([0-9]+([eE][+-]?[0-9]+)?)$"

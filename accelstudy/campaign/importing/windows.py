@@ -116,7 +116,7 @@ def slide_windows(log: Log, width: int) -> Windows:
     covered = np.isfinite(variance)
     if not covered.any():
         raise InputError(
-            f"{log.path}: too few samples for a window of {width}, or gaps all over"
+            f"{log.path}: too few samples for a window of {width} samples, or gaps all over"
             f"{log.unit_hint()}"
         )
     # A part of an array is no copy of it.
