@@ -9,7 +9,7 @@ from campaign_helpers import made, unaided
 
 import accelstudy as acs
 from accelstudy.basics.errors import InputError
-from accelstudy.basics.units import STANDARD_GRAVITY
+from accelstudy.basics.units import GON, STANDARD_GRAVITY
 from accelstudy.campaign.calibration.fit import fit_campaign
 from accelstudy.campaign.format import read_campaign, write_campaign
 from accelstudy.campaign.gross_errors.recognition import (
@@ -116,9 +116,48 @@ def test_exchanged_rows_are_recognised_and_put_back(design, designs):
         found = recognise(campaign)
         assert found is not None, (design, wrong)
         assert found.name == "row_order"
-        assert (", … are exchanged" in found.reason) == (len(wrong) > 40)
+        slipped = np.all(np.diff(wrong) == 1) and len(wrong) > 2
+        said = "stand in the row below theirs" if slipped else "are exchanged"
+        assert design == "repeated" or said in found.reason
+        assert (f", … {said}" in found.reason) == (len(wrong) > 40)
         # Which of two repeats is which does not show, and is all the same.
         assert np.abs(found.corrected.forces - right.forces).max() < 0.06, (design, wrong)
+
+
+@pytest.mark.parametrize("step", [1, -1])
+def test_a_row_that_was_lost_shifts_all_others(designs, step):
+    """What belongs to the last row in place stands nowhere, and its position is left out."""
+    right = designs["symmetric"]
+    lost, lone = (0, -1) if step > 0 else (-1, 0)
+    forces = np.roll(right.forces, -step, axis=0)
+    forces[lone] = -right.forces[lone]
+    found = recognise(right.with_arrays(forces=forces))
+    assert [name for name, _ in found.names] == ["row_order", "outlier_position"]
+    assert f"in the row {'above' if step > 0 else 'below'} theirs" in found.reason
+    assert found.errors[-1].left_out == (right.positions[lost],)
+    np.testing.assert_allclose(
+        found.corrected.forces, np.delete(right.forces, lost, axis=0), atol=0.06
+    )
+
+
+def test_roll_and_pitch_are_exchanged_in_the_axes_of_the_log(designs):
+    """With z up, one of both has the other sign than in frd."""
+    right = designs["plain"]
+    for frame, sign in {"frd": 1, "flu": -1, "rfu": 1}.items():
+        log = LogLayout(columns={"fx": 0, "fy": 1, "fz": 2}, frame=frame)
+        angles = sign * right.angles[:, ::-1]
+        found = recognise(right.with_arrays(angles=angles).with_header(log=log))
+        assert found.reason == "roll and pitch of the robot are exchanged"
+        np.testing.assert_allclose(found.corrected.angles, right.angles, rtol=1e-9)
+
+
+def test_degrees_for_gon_show_at_small_tilts(designs):
+    """Biases and scales then explain most of a tenth."""
+    right = designs["many"]
+    steep = np.abs(right.angles).max(axis=1) > 60 * GON
+    right = right.without(dict.fromkeys(right.positions[steep].tolist(), "steep"))
+    found = recognise(gross.unit(right, angle=0.9))
+    assert found.reason == "the robot's angles are in degrees"
 
 
 COUNTS = {

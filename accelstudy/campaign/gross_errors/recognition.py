@@ -51,6 +51,8 @@ MAX_AXIS_RATIO = 2.0
 distance of any axes."""
 MAX_EXCHANGED = 1000
 """Largest number of rows that are reordered; if more do not fit, their order is not the cause."""
+MIN_SHIFTED_SHARE = 0.5
+"""Share of the exchanged rows that belong one row further, above which the table has slipped."""
 MIN_POSITIONS_PER_OUTLIER = 8
 """At most one of so many positions may be bumped; if more are off, something else is wrong."""
 
@@ -283,8 +285,11 @@ def axes(sensor: RealSensor) -> Iterator[Correction]:
         one for one, miss in zip(tried, misses, strict=True) if miss < MAX_AXIS_RATIO * min(misses)
     ]
     yield from (one for _, one in sorted(near, key=lambda one: one[0]) if one.reason)
-    reason = "roll and pitch of the robot are exchanged"
-    yield Correction("axis_error", reason, campaign.with_arrays(angles=campaign.angles[:, ::-1]))
+    # Where z points up, one of both has the other sign than in frd.
+    log = campaign.header.log
+    sign = 1.0 if log is None else np.prod(log.axes.signs[:2])
+    reason, exchanged = "roll and pitch of the robot are exchanged", sign * campaign.angles[:, ::-1]
+    yield Correction("axis_error", reason, campaign.with_arrays(angles=exchanged))
 
 
 def columns_of_counts(sensor: RealSensor) -> Iterator[Correction]:
@@ -351,12 +356,17 @@ def _axes_in_words(matrix: Array) -> str:
 
 def units(sensor: RealSensor, angle_unit: str = "gon") -> Iterator[Correction]:
     """Convert the forces, or the angles, as if they were in another unit."""
-    if not sensor.is_far_off:
-        return
-    campaign = sensor.campaign
+    if sensor.is_far_off:
+        yield from _force_units(sensor.campaign)
+    # Degrees for gon are only a tenth off.
+    if sensor.expected is not None and sensor.distance.max() >= MIN_POSITION_ERROR * sensor.gravity:
+        yield from _angle_units(sensor.campaign, angle_unit)
+
+
+def _force_units(campaign: Campaign) -> Iterator[Correction]:
     norm = usual_norm(campaign.forces) / campaign.gravity
     own = campaign.header.unit if campaign.header.unit in SENSOR_UNITS else "m/s^2"
-    sizes, turns = UNITS["m/s^2"], UNITS["rad"]
+    sizes = UNITS["m/s^2"]
     for stated in (own, "g" if own == "m/s^2" else "m/s^2"):
         for unit in SENSOR_UNITS:
             factor = sizes[unit] / sizes[stated]
@@ -365,14 +375,16 @@ def units(sensor: RealSensor, angle_unit: str = "gon") -> Iterator[Correction]:
                 matrix = factor * np.eye(3)
                 reason = f"the forces are in {unit}{instead}"
                 yield Correction("unit_error", reason, _turned(campaign, matrix), matrix)
-    if sensor.expected is not None:
-        for unit, name in ROBOT_UNITS.items():
-            if unit != angle_unit:
-                factor = turns[unit] / turns[angle_unit]
-                angles = {"angles": campaign.angles, "yaw": campaign.yaw}
-                scaled = {k: None if a is None else factor * a for k, a in angles.items()}
-                reason = f"the robot's angles are in {name}"
-                yield Correction("unit_error", reason, campaign.with_arrays(**scaled))
+
+
+def _angle_units(campaign: Campaign, angle_unit: str) -> Iterator[Correction]:
+    turns, angles = UNITS["rad"], {"angles": campaign.angles, "yaw": campaign.yaw}
+    for unit, name in ROBOT_UNITS.items():
+        if unit != angle_unit:
+            factor = turns[unit] / turns[angle_unit]
+            scaled = {k: None if a is None else factor * a for k, a in angles.items()}
+            reason = f"the robot's angles are in {name}"
+            yield Correction("unit_error", reason, campaign.with_arrays(**scaled))
 
 
 def rows(sensor: RealSensor) -> Iterator[Correction]:
@@ -390,12 +402,17 @@ def rows(sensor: RealSensor) -> Iterator[Correction]:
     least = min(MIN_RATIO * sensor.usual_distance, MIN_POSITION_ERROR * sensor.gravity)
     cost = campaign.forces[wrong][:, None] - sensor.expected[wrong][None]
     order = np.arange(campaign.n_positions)
-    gain = np.sum(cost**2, axis=2) + least**2 * (1 - np.eye(len(wrong)))
+    # What fits nowhere, as where a row was lost, does not keep the others from their places.
+    most = MAX_USABLE_ERROR * sensor.gravity
+    gain = np.minimum(np.sum(cost**2, axis=2), most**2) + least**2 * (1 - np.eye(len(wrong)))
     order[wrong] = wrong[optimize.linear_sum_assignment(gain.T)[1]]
     moved = order != np.arange(len(order))
     if moved.any():
         positions = short_list([*map(str, campaign.positions[moved])])
         reason = f"the forces of positions {positions} are exchanged"
+        for way, step in {"above": -1, "below": 1}.items():
+            if np.mean(order[moved] - np.flatnonzero(moved) == step) > MIN_SHIFTED_SHARE:
+                reason = f"the forces of positions {positions} stand in the row {way} theirs"
         read = {"forces": campaign.forces, "sd": campaign.sd, "n_samples": campaign.n_samples}
         ordered = {name: None if a is None else a[order] for name, a in read.items()}
         yield Correction("row_order", reason, campaign.with_arrays(**ordered), changed=moved)
