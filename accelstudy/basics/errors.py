@@ -63,7 +63,7 @@ _BRIEF.maxlevel, _BRIEF.maxstring, _BRIEF.maxother, _BRIEF.maxlong = 3, 60, 60, 
 
 
 def brief(value: object) -> str:
-    """Show a value in a message as Python writes it, cut short if it is long; a table by its class."""
+    """Show a value in a message as Python writes it, cut short; a table by its class."""
     try:
         text = _BRIEF.repr(value)
     except ValueError:  # Python writes no integer of more than 4300 digits

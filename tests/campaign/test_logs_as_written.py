@@ -7,7 +7,7 @@ from datetime import UTC, datetime, timedelta, timezone
 import numpy as np
 import pandas as pd
 import pytest
-from calling import refusal, succeed
+from calling import refusal, refused, succeed
 from log_helpers import BIAS, HAND_RATE, HOLD, HOLDS, MOVE, SCALE, by_hand, found, open_log
 from recorded import EPOCH, message, ulog, write_bag, write_ulog
 
