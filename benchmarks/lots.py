@@ -80,6 +80,7 @@ KINDS = (
     Kind("each sigma is stated wrongly, mixed noise", noises=("level",), mixed=True),
     Kind("one effect, in all, mixed noise", single, (1.0,), 10.5, mixed=True),
     Kind("one sensor is odd, mixed noise", single, (0.0,), 60.0, mixed=True),
+    Kind("two effects, in all", pairs, (1.0, 1.0), 16.0),
 )
 
 

@@ -20,7 +20,7 @@ from accelstudy.diagnosis.rules import RULES
 from accelstudy.effects import get_effect
 from accelstudy.lots.evidence import NOISE_PRIORS, Sensor, SensorEvidence, lot_classes
 from accelstudy.lots.mixture import Mixture, log_odd
-from accelstudy.lots.sizes import LotResiduals, Statistics
+from accelstudy.lots.sizes import LotResiduals, ShownEffect
 from accelstudy.lots.type_file import TypeParameter
 
 Array = NDArray[np.float64]
@@ -140,22 +140,21 @@ class Pass:
         return LotResiduals([one.frame for one in self.evidence], levels)
 
     @cached_property
-    def shown(self) -> dict[str, dict[str, Statistics]]:
-        """What sensors tell of the sizes of lasting effects that most of them show, by shapes.
+    def shown(self) -> dict[str, ShownEffect]:
+        """What sensors tell of the sizes of lasting effects that most of them show.
 
-        The shapes are those that the campaigns try which show an effect least and most.
+        An effect has the shape that explains most if it is equally large in all, of those that its
+        first campaign tries and of the best one of the campaign that shows it most.
         """
-        told = dict[str, dict[str, Statistics]]()
+        told = dict[str, ShownEffect]()
         for name in sorted({name for one in self.evidence for name in one.shapes}):
             showing = [one for one in self.evidence if name in one.shapes]
             if 2 * len(showing) > sum(one.base is not None for one in self.evidence):
                 most = max(showing, key=lambda one: one.odds[name])
-                each = {
-                    spec: self.residuals.statistics(spec)
-                    for spec in dict.fromkeys([*showing[0].shapes[name], most.specs[name]])
-                }
-                told[name] = {spec: one for spec, one in each.items() if one.right.size}
-        return {name: each for name, each in told.items() if each}
+                shapes = {*showing[0].shapes[name], most.specs[name]}
+                if (best := self.residuals.strongest(sorted(shapes))) is not None:
+                    told[name] = best
+        return told
 
     @cached_property
     def classes(self) -> dict[str, tuple[str, ...]]:
@@ -171,19 +170,11 @@ class Pass:
         own = {n: np.array([one.odds.get(n, 0.0) for one in self.evidence]) for n in prior}
         odd, typical = log_odd(prior, own), {}
         for name in {*self.shown} & {*prior}:
-            sizes = self.residuals.typical(self.shown[name][self._best[name]], odd)
+            sizes = self.residuals.typical(self.shown[name], odd)
             # What few sensors have, has no sizes of a type.
             if max(sizes, key=lambda one: one.log_likelihood).share * len(odd) > self._few:
                 typical[name] = sizes
         return Mixture(prior, own, typical)
-
-    @cached_property
-    def _best(self) -> dict[str, str]:
-        """Effects of `shown` in the shape that explains most if it is equally large in all."""
-        return {
-            name: max(each, key=lambda spec: self.residuals.pooled(each[spec])[1])
-            for name, each in self.shown.items()
-        }
 
     @property
     def _few(self) -> float:
@@ -209,8 +200,7 @@ class Pass:
     @cached_property
     def _in_common(self) -> list[float]:
         """P-values of what the sensors have in common: sizes of effects, and any pattern."""
-        shown = [one for each in self.shown.values() for one in each.values()]
-        sizes = [min(map(self.residuals.p_value, shown)) * len(shown)] if shown else []
+        sizes = [_smallest([one.p_value for one in self.shown.values()])] if self.shown else []
         return [*sizes, *self.residuals.p_value_of_pattern]
 
     @property
@@ -254,12 +244,9 @@ class Pass:
         members = tuple(member for name in names for member in self.classes[name])
         share, low, high = self.mixture.share(first)
         having, each = self.mixture.effects[first].having, [one.specs for one in self.evidence]
-        counted = Counter[str]()
-        for specs, weight in zip(each, having.tolist(), strict=True):
-            if first in specs:
-                counted[specs[first]] += weight
-        usual = max(counted, key=counted.__getitem__, default=None)
-        spec = self._best.get(first, usual)
+        most = max(self.evidence, key=lambda one: one.odds.get(first, -np.inf))
+        shown = self.shown.get(first)
+        spec = most.specs.get(first) if shown is None else shown.spec
         own: tuple[str, ...] = ()
         if spec is not None:
             sudden = get_effect(spec).sudden

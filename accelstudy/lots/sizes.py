@@ -51,17 +51,30 @@ LIKELIHOOD_TOLERANCE = 1e-3
 """Change of the log likelihood below which the search ends."""
 
 
-class Statistics(NamedTuple):
+class ShownEffect(NamedTuple):
     """What sensors tell of the parameters of an effect, turned to those that they show.
 
     Attributes
     ----------
+    spec : str, the effect in one of its shapes
     normal : (n, k, k) array, N of the sensors; 0 for one that says nothing
     right : (n, k) array, b
+    pooled : (k,) array, its size if it is equally large in all
+    part : float, how much they show of that, a χ² of k in noise alone
+    shapes : int, of the effect, of which this one shows most
     """
 
+    spec: str
     normal: Array
     right: Array
+    pooled: Array
+    part: float
+    shapes: int = 1
+
+    @property
+    def p_value(self) -> float:
+        """Probability that noise alone would show as much in common."""
+        return min(self.shapes * float(stats.chi2.sf(self.part, len(self.pooled))), 1.0)
 
 
 class TypicalSize(NamedTuple):
@@ -125,8 +138,12 @@ class LotResiduals:
             precision[some] = np.sum(np.exp(each - density[some, None]) * inverse, axis=1)
         return density, precision
 
-    def statistics(self, spec: str) -> Statistics:
-        """Evaluate what an effect does in the campaigns of the sensors."""
+    def shown(self, spec: str) -> ShownEffect:
+        """Evaluate what an effect does in the campaigns of the sensors.
+
+        What they show in common is a χ² whatever the noise: residuals are taken in units of what
+        they are themselves, as noise has their directions at random.
+        """
         n, k = len(self.frames), len(get_effect(spec).parameters)
         normal, right, total = np.zeros((n, k, k)), np.zeros((n, k)), np.zeros(k)
         for i, frame in enumerate(self.frames):
@@ -140,29 +157,28 @@ class LotResiduals:
         values, vectors = np.linalg.eigh(normal.sum(axis=0) / np.outer(scale, scale))
         seen = values > RULES.visible**2
         turn = vectors[:, seen] / scale[:, None] / np.sqrt(values[seen] / n)
-        return Statistics(turn.T @ normal @ turn, right @ turn)
-
-    def pooled(self, told: Statistics) -> tuple[Array, float]:
-        """Size of an effect if it is equally large in all, and how much they show then, a χ² of k.
-
-        It is one whatever the noise: residuals are taken in units of what they are themselves, as
-        noise has their directions at random.
-        """
+        normal, right = turn.T @ normal @ turn, right @ turn
         weights = self.redundancy / np.where(self.squares > 0, self.squares, 1.0)
-        right = weights @ told.right
-        size = _solved(np.einsum("n,nkl->kl", weights, told.normal), right)
-        return size, float(right @ size)
+        size = _solved(np.einsum("n,nkl->kl", weights, normal), weights @ right)
+        return ShownEffect(spec, normal, right, size, float(weights @ right @ size))
 
-    def p_value(self, told: Statistics) -> float:
-        """Probability that noise alone would show as much in common."""
-        return float(stats.chi2.sf(self.pooled(told)[1], told.right.shape[1]))
+    def strongest(self, specs: Sequence[str]) -> ShownEffect | None:
+        """The shape of an effect that explains most if it is equally large in all, if any does.
+
+        Parameters
+        ----------
+        specs : the effect in its shapes
+        """
+        shown = [one for one in map(self.shown, specs) if one.right.size]
+        best = max(shown, key=lambda one: one.part, default=None)
+        return None if best is None else best._replace(shapes=len(shown))
 
     @cached_property
     def p_value_of_pattern(self) -> list[float]:
         """Probability that noise alone has as much in common, residual by residual; [] if none has.
 
         It shows what no name explains, in sensors that were in the same positions and conditions;
-        in other ones, it shows nothing. Residuals are taken as in `pooled`.
+        in other ones, it shows nothing. Residuals are taken as in `shown`.
         """
         each = [frame.residuals for frame in self.frames if frame]
         n, shapes = len(each), {one.z.shape for one in each}
@@ -173,7 +189,7 @@ class LotResiduals:
         shown = float(mean @ mean) / r
         return [float(stats.f.sf(shown * (n - 1) / max(n - shown, 1e-300), r, (n - 1) * r))]
 
-    def typical(self, told: Statistics, odd: Array) -> list[TypicalSize]:
+    def typical(self, told: ShownEffect, odd: Array) -> list[TypicalSize]:
         """Most probable sizes and share of an effect, for each scatter.
 
         Parameters
@@ -181,8 +197,7 @@ class LotResiduals:
         told : what sensors tell of the effect
         odd : (n,) array, log odds of each sensor to be odd, whose sizes are not those of the type
         """
-        size, none = self.pooled(told)[0], np.full_like(odd, -np.inf)
-        starts = [(share, size / share) for share in SHARES]
+        starts, none = [(x, told.pooled / x) for x in SHARES], np.full_like(odd, -np.inf)
         # If sizes differ much, each sensor looks odd beside their mean.
         without = (self._search(told, none, max(SCATTERS), *start) for start in starts)
         starts += [(one.share, one.mean) for one in without]
@@ -192,7 +207,7 @@ class LotResiduals:
         ]
 
     def _search(
-        self, told: Statistics, odd: Array, scatter: float, share: float, mean: Array
+        self, told: ShownEffect, odd: Array, scatter: float, share: float, mean: Array
     ) -> TypicalSize:
         """Search for sizes and share with a scatter, by expectation and maximization.
 
@@ -202,7 +217,8 @@ class LotResiduals:
         scatter : float, τ
         share, mean : ρ and μ to begin with
         """
-        (normal, right), k = told, told.right.shape[1]
+        _, normal, right, *_ = told
+        k = right.shape[1]
         nothing, before = self.noise_density(self.squares)[0], -np.inf
         for _ in range(MAX_STEPS):
             variance = scatter**2 * float(np.mean(mean**2))

@@ -28,7 +28,7 @@ def test_a_campaign_that_does_not_determine_the_model_says_nothing():
     assert (silent.odds, silent.p_value) == ({}, 1.0)
     loud = Sensor(one, get_model("bias-scale"), get_approach("gravity")).evidence()
     residuals = LotResiduals([silent.frame, loud.frame], [loud.base.level] * 2)
-    assert [*residuals.statistics("thermal_bias").right.any(axis=1)] == [False, True]
+    assert [*residuals.shown("thermal_bias").right.any(axis=1)] == [False, True]
 
 
 def over_sensors(values, sigmas, odd=()):

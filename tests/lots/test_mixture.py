@@ -147,7 +147,7 @@ def test_odds_are_the_integral_over_sizes_and_noise(freedom):
     """Of the squares of the residuals and of an effect in two thirds of the sensors."""
     sizes = 0.6 * (np.arange(N) < 2 * N / 3)[:, None] * [1.0, 0.0, 0.0]
     *_, residuals = type_of(np.random.default_rng(1), sizes, freedom=freedom)
-    told = residuals.statistics(NAMES[0])
+    told = residuals.shown(NAMES[0])
     points = np.linspace(-9, 9, 301)
     shape = freedom / 2
     variance = stats.invgamma.ppf((np.arange(2000) + 0.5) / 2000, shape, scale=shape)
@@ -170,7 +170,7 @@ def test_odds_are_the_integral_over_sizes_and_noise(freedom):
 def test_a_size_that_is_fitted_costs_what_its_integral_says():
     """One size in all sensors: the evidence is the mean of the likelihood over the prior of it."""
     *_, residuals = type_of(np.random.default_rng(6), np.full((N, 3), [1.0, 0.0, 0.0]))
-    told = residuals.statistics(NAMES[0])
+    told = residuals.shown(NAMES[0])
     of_type = residuals.typical(told, NEVER)[SCATTERS.index(0.0)]
     normal, right = told.normal.sum(), told.right.sum()
     best, sigma = right / normal, 1 / np.sqrt(normal)
@@ -185,7 +185,7 @@ def test_an_odd_sensor_has_no_say_in_the_sizes_of_the_type():
     sizes = np.full((N, 3), [1.0, 0.0, 0.0])
     sizes[5] *= 40
     *_, residuals = type_of(np.random.default_rng(7), sizes)
-    told = residuals.statistics(NAMES[0])
+    told = residuals.shown(NAMES[0])
     odd = told.right[:, 0] ** 2 / told.normal[:, 0, 0] / 2 - 10  # by a size of its own
     scale = told.normal[0, 0, 0] / (residuals.frames[0].rows(get_effect(NAMES[0])) ** 2).sum()
     for of_type in residuals.typical(told, odd)[:2]:
@@ -198,8 +198,8 @@ def test_noise_has_as_much_in_common_as_is_said(noise):
     rng, said = np.random.default_rng(8), []
     for _ in range(150):
         *_, residuals = type_of(rng, np.zeros((N, 3)), noise)
-        told = residuals.statistics(NAMES[0])
-        said.append((residuals.p_value(told), *residuals.p_value_of_pattern))
+        told = residuals.shown(NAMES[0])
+        said.append((told.p_value, *residuals.p_value_of_pattern))
     for values in np.transpose(said):
         assert stats.kstest(values, "uniform").pvalue > 1e-3
 
@@ -207,7 +207,7 @@ def test_noise_has_as_much_in_common_as_is_said(noise):
 def test_what_is_too_small_for_one_sensor_shows_in_all():
     rng = np.random.default_rng(9)
     *_, residuals = type_of(rng, np.full((N, 3), [0.25, 0.0, 0.0]))
-    assert residuals.p_value(residuals.statistics(NAMES[0])) < 1e-6
+    assert residuals.shown(NAMES[0]).p_value < 1e-6
     # A pattern without a name does so where sensors were in the same positions.
     pattern = 0.5 * rng.standard_normal(ROWS)
     same = [frame_of(np.zeros((ROWS, 3)), pattern + z) for z in rng.standard_normal((N, ROWS))]
