@@ -133,7 +133,7 @@ def weigh_lot(
     Raises
     ------
     InputError
-        If a campaign does not determine the model, or leaves no redundancy.
+        If a process is killed.
     """
     sensors = [
         Sensor(campaign, model, approach or usual_approach(campaign), seed + i)

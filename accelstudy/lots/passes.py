@@ -6,7 +6,7 @@ from collections import Counter
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Any, NamedTuple, TypeAlias
+from typing import TYPE_CHECKING, Any, NamedTuple, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
@@ -21,7 +21,9 @@ from accelstudy.effects import get_effect
 from accelstudy.lots.evidence import NOISE_PRIORS, Sensor, SensorEvidence, lot_classes
 from accelstudy.lots.mixture import Mixture, log_odd
 from accelstudy.lots.sizes import LotResiduals, ShownEffect
-from accelstudy.lots.type_file import TypeParameter
+
+if TYPE_CHECKING:
+    from accelstudy.lots.type_parameter import TypeParameter
 
 Array = NDArray[np.float64]
 Mapped: TypeAlias = Callable[..., Iterator[Any]]

@@ -12,7 +12,7 @@ from accelstudy.approaches import get_approach
 from accelstudy.campaign.format import read_campaign, write_campaign
 from accelstudy.lots.evidence import Sensor
 from accelstudy.lots.sizes import LotResiduals
-from accelstudy.lots.type_file import TypeParameter
+from accelstudy.lots.type_parameter import TypeParameter
 from accelstudy.sensors.models import get_model
 
 STANDARD_ERRORS = 3.3

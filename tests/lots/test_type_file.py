@@ -15,8 +15,8 @@ from accelstudy.approaches import get_approach
 from accelstudy.campaign.calibration.fit import fit_campaign
 from accelstudy.campaign.format import write_campaign
 from accelstudy.campaign.sensor_type import SensorType, read_type
+from accelstudy.lots.calibration import LotCalibration
 from accelstudy.lots.noise import NoisePrior
-from accelstudy.lots.output import Lot
 from accelstudy.lots.passes import LotEffect, SensorState
 from accelstudy.lots.type_file import write_type
 from accelstudy.schemes import get_scheme
@@ -48,7 +48,7 @@ def type_of(sensors, folder, effects=()):
         last=SimpleNamespace(usual=range(len(sensors)), sensors=named),
         each=[SensorState(one.name, (), 1.0) for one in sensors], effects=effects, model=MODEL,
     )  # fmt: skip
-    assert write_type(Lot(lot, MODEL, fits, {}, {}), folder)
+    assert write_type(LotCalibration(lot, MODEL, fits, {}), folder)
     return folder / "type.yaml"
 
 

@@ -21,6 +21,7 @@ from accelstudy.campaign.batch import COLUMNS, PARAMETERS
 from accelstudy.campaign.calibration.file_format import CalibrationDocument
 from accelstudy.epochs.file_format import HistoryDocument
 from accelstudy.files.documents import json_text
+from accelstudy.lots.calibration import LotCalibration
 from accelstudy.lots.evidence import SensorEvidence
 from accelstudy.lots.file_format import LotDocument
 from accelstudy.lots.lot import LotDiagnosis
@@ -133,7 +134,7 @@ def _lot():
     one, model = Pass(sensors, tuple(each)), get_model("bias-scale")
     assert one.found is not None
     lot = LotDiagnosis((one, one), model, (one.found,))
-    return Lot(lot, model, {}, {}, {}).content
+    return Lot(LotCalibration(lot, model, {}, {}), {}).content
 
 
 def test_the_reference_says_what_the_kinds_of_keywords_mean():

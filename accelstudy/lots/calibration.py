@@ -1,0 +1,138 @@
+"""The sensors of a lot, calibrated with all that their model lacks."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from contextlib import suppress
+from dataclasses import dataclass, replace
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+from accelstudy.basics.errors import InputError
+from accelstudy.basics.units import GON, MGON
+from accelstudy.campaign.calibration.campaign_fit import CampaignFit
+from accelstudy.campaign.calibration.fit import fit_campaign
+from accelstudy.leveling.error import (
+    ATTITUDES,
+    MAX_TILT_GON,
+    cap_forces,
+    holds_in_use,
+    tilt_error,
+)
+from accelstudy.lots.file_format import Tilt
+from accelstudy.lots.lot import LotDiagnosis
+from accelstudy.lots.passes import LotEffect
+from accelstudy.lots.type_parameter import TypeParameter
+from accelstudy.sensors.models import compose
+from accelstudy.sensors.sensor import SensorModel
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True, eq=False)
+class LotCalibration:
+    """A calibration of each sensor of a lot with the model of the type.
+
+    Attributes
+    ----------
+    diagnosis : LotDiagnosis, all that is missing
+    model : SensorModel, that was diagnosed, without what was found
+    fits : mapping of the numbers of sensors to calibrations with the model of the type
+    failed : mapping of campaigns to why they have none
+    """
+
+    diagnosis: LotDiagnosis
+    model: SensorModel
+    fits: Mapping[int, CampaignFit]
+    failed: Mapping[str, str]
+
+    @classmethod
+    def of(cls, diagnosis: LotDiagnosis, model: SensorModel) -> LotCalibration:
+        """Calibrate each sensor, with its own times of what is sudden."""
+        fits, failed = dict[int, CampaignFit](), dict[str, str]()
+        for i, sensor in enumerate(diagnosis.last.sensors):
+            try:
+                fits[i] = fit_campaign(sensor.campaign, sensor.model, sensor.approach)
+            except InputError as error:
+                failed[sensor.campaign.name] = str(error)
+        return cls(diagnosis, model, fits, failed)
+
+    @property
+    def usual(self) -> dict[int, CampaignFit]:
+        """Calibrations of the sensors that are not odd, by their numbers."""
+        return {i: self.fits[i] for i in self.diagnosis.last.usual if i in self.fits}
+
+    @cached_property
+    def parameters(self) -> dict[str, TypeParameter]:
+        """Parameters of the model of the type; of an effect, over the sensors that have it."""
+        diagnosis, n = self.diagnosis, len(self.diagnosis.last.sensors)
+        model, each = diagnosis.model, diagnosis.each
+        values, sigmas = np.full((2, n, model.n_parameters), np.nan)
+        for i, fit in self.fits.items():
+            values[i], sigmas[i] = fit.parameters, np.sqrt(self._variances(i, fit))
+        usual = np.isin(np.arange(n), diagnosis.last.usual)
+        having = {
+            name: np.array([found.names[0] in one.names for one in each])
+            for found in diagnosis.effects
+            for name in _parameters_of(found)
+        }
+        return {
+            p.name: TypeParameter(
+                p.name, p.unit, stays, values[:, j], sigmas[:, j], usual,
+                having.get(p.name, np.ones(n, dtype=bool)),
+            )
+            for j, (p, stays) in enumerate(zip(model.parameters, model.stays.tolist(), strict=True))
+        }  # fmt: skip
+
+    def sizes(self, found: LotEffect) -> list[TypeParameter]:
+        """Parameters of an effect that was found."""
+        return [self.parameters[name] for name in _parameters_of(found)]
+
+    def _variances(self, i: int, fit: CampaignFit) -> Array:
+        """Variances of the parameters of a sensor, (u,), by what all sensors tell of its noise.
+
+        Its own estimate has few degrees of freedom: taken as it is, what is not known of the noise
+        would look like scatter of the parameters.
+        """
+        own, noise = fit.sigma**2, self.diagnosis.last.sensors[i].noise
+        if fit.noise.trusted or noise is None:
+            return own
+        r, ratio = fit.solution.redundancy, (noise.sigma / fit.sigma_position_posteriori) ** 2
+        return own * float((r + noise.freedom * ratio) / (r + noise.freedom))
+
+    @cached_property
+    def tilt(self) -> Tilt | None:
+        """Rms tilt error of the sensors by what their model lacked.
+
+        It is over tilts up to `MAX_TILT_GON`, in the conditions of the campaigns, of sensors that
+        are not odd, and without what the uncertainty of the parameters adds. None if nothing of the
+        catalogue was found, or no sensor tells it.
+        """
+        squares = []
+        if any(found.spec is not None for found in self.diagnosis.effects):
+            for fit in self.usual.values():
+                with suppress(InputError):
+                    squares.append(_squared_error(fit, self.model))
+        if not squares:
+            return None
+        roll, pitch = np.sqrt(np.maximum(np.mean(squares, axis=0), 0.0)) / MGON
+        return Tilt(roll_mgon=roll, pitch_mgon=pitch, max_tilt_gon=MAX_TILT_GON)
+
+
+def _parameters_of(found: LotEffect) -> Sequence[str]:
+    """Names of the parameters of what was found; none of what is no effect."""
+    return () if found.spec is None else compose(found.spec, (found.spec,)).parameter_names
+
+
+def _squared_error(fit: CampaignFit, model: SensorModel) -> Array:
+    """Square of the error less that by noise: of nested models the difference of covariances."""
+    base = replace(fit_campaign(fit.campaign, model, fit.approach), judgement=fit.noise)
+    f_b = cap_forces(MAX_TILT_GON * GON, ATTITUDES, fit.gravity)
+    hold = holds_in_use(fit.campaign.hold, fit.campaign.n_positions, f_b)
+    error = tilt_error(
+        fit.model, fit.parameters, model, base.parameters, f_b, fit.gravity, hold
+    ).constant
+    by_noise = fit.tilt.parameters**2 - base.tilt.parameters**2
+    return np.asarray(error - by_noise)
