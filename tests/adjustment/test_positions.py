@@ -14,13 +14,7 @@ from usual import BOTH, GRAVITY, NINE, ROBOT
 import accelstudy as acs
 from accelstudy.adjustment import calibrate, calibration
 from accelstudy.adjustment.components import variance_components
-from accelstudy.adjustment.quality import (
-    held_out,
-    position_tests,
-    reliability,
-    solve,
-    suspects,
-)
+from accelstudy.adjustment.quality import held_out, position_tests, reliability, solve, suspects
 from accelstudy.approaches import get_approach
 from accelstudy.campaign.calibration.fit import fit_campaign
 from accelstudy.campaign.calibration.result import Calibration

@@ -8,12 +8,7 @@ from usual import BOTH, GRAVITY, NINE, ROBOT
 
 from accelstudy.adjustment import calibrate
 from accelstudy.adjustment.components import variance_components
-from accelstudy.adjustment.quality import (
-    held_out,
-    position_tests,
-    reliability,
-    solve,
-)
+from accelstudy.adjustment.quality import held_out, position_tests, reliability, solve
 from accelstudy.basics.units import MGON
 from accelstudy.effects import HoldConditions
 from accelstudy.leveling.angles import roll_pitch, specific_force

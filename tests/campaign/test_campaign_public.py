@@ -6,11 +6,7 @@ import pytest
 from calling import refused
 
 from accelstudy.campaign.importing import public
-from accelstudy.campaign.importing.public import (
-    PublicData,
-    public_data,
-    public_file,
-)
+from accelstudy.campaign.importing.public import PublicData, public_data, public_file
 
 CONTENT = bytes(range(256)) * 64
 

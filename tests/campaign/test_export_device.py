@@ -15,11 +15,7 @@ from campaign_helpers import with_keys
 import accelstudy as acs
 from accelstudy.campaign.calibration.c_code import c_header
 from accelstudy.campaign.calibration.export import export
-from accelstudy.campaign.calibration.file_format import (
-    CalibrationDocument,
-    Correction,
-    Quality,
-)
+from accelstudy.campaign.calibration.file_format import CalibrationDocument, Correction, Quality
 from accelstudy.campaign.calibration.sensor_calibration import SensorCalibration
 from accelstudy.campaign.header import LogLayout
 from accelstudy.effects import HoldConditions, effect_names, get_effect

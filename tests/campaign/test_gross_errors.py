@@ -12,11 +12,7 @@ from accelstudy.basics.errors import InputError
 from accelstudy.basics.units import GON, STANDARD_GRAVITY
 from accelstudy.campaign.calibration.fit import fit_campaign
 from accelstudy.campaign.format import read_campaign, write_campaign
-from accelstudy.campaign.gross_errors.recognition import (
-    EXCHANGES,
-    GROSS_ERRORS,
-    recognise,
-)
+from accelstudy.campaign.gross_errors.recognition import EXCHANGES, GROSS_ERRORS, recognise
 from accelstudy.campaign.header import LogLayout
 from accelstudy.diagnosis.pipeline import diagnose
 from accelstudy.leveling.angles import angles_of

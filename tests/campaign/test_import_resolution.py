@@ -8,11 +8,7 @@ from log_helpers import find_holds, opened, session, table, write
 import accelstudy as acs
 from accelstudy.basics.units import STANDARD_GRAVITY as G
 from accelstudy.campaign.format import read_campaign
-from accelstudy.campaign.importing.noise import (
-    noise_before_rounding,
-    rounding_of_mean,
-    step_of,
-)
+from accelstudy.campaign.importing.noise import noise_before_rounding, rounding_of_mean, step_of
 from accelstudy.schemes import get_scheme
 
 BIAS, SCALE = np.array([0.12, -0.08, 0.2]), 1 + 1e-6 * np.array([4000, -3000, 6000])

@@ -15,13 +15,7 @@ from accelstudy.design.criteria import get_criterion, rms_tilt
 from accelstudy.design.estimability import estimability
 from accelstudy.design.information import position_rows
 from accelstudy.design.search import Search
-from accelstudy.design.spaces import (
-    Attitudes,
-    angles_to,
-    attitudes_by_eye,
-    cube,
-    find_attitudes,
-)
+from accelstudy.design.spaces import Attitudes, angles_to, attitudes_by_eye, cube, find_attitudes
 from accelstudy.design.task import Task
 from accelstudy.effects import HoldConditions
 from accelstudy.leveling.error import cap_forces, tilt_error

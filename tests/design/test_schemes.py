@@ -10,14 +10,7 @@ from places import SHARED
 from scipy.optimize import least_squares
 from scipy.spatial.transform import Rotation
 
-from accelstudy.schemes import (
-    Scheme,
-    get_scheme,
-    register,
-    registry,
-    scheme_families,
-    scheme_names,
-)
+from accelstudy.schemes import Scheme, get_scheme, register, registry, scheme_families, scheme_names
 from accelstudy.schemes.mclaren import mclaren_orbit
 
 GENERIC = Rotation.from_euler("xyz", [15, 25, 35], degrees=True)

@@ -9,11 +9,7 @@ from usual import GRAVITY, NINE, G
 
 from accelstudy.diagnosis.space.frame import Candidates, HoldColumns, signatures
 from accelstudy.diagnosis.space.hypotheses import OUTLIER, Hypotheses
-from accelstudy.diagnosis.visibility import (
-    examine_campaign,
-    upper_limits,
-    visibilities,
-)
+from accelstudy.diagnosis.visibility import examine_campaign, upper_limits, visibilities
 from accelstudy.effects import effect_names, get_effect
 from accelstudy.sensors.sensor import SensorModel
 from accelstudy.simulation.sessions import session

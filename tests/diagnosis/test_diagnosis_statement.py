@@ -4,11 +4,7 @@ import pytest
 from diagnosis_helpers import explanation
 
 from accelstudy.diagnosis.decision.statement import family_of, statement_of
-from accelstudy.diagnosis.report.words import (
-    missing,
-    most_probable,
-    without_a_name,
-)
+from accelstudy.diagnosis.report.words import missing, most_probable, without_a_name
 
 SLOW, EVEN = "slow change in time", "even nonlinearity"
 

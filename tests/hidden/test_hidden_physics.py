@@ -15,14 +15,7 @@ from studies.hidden import physics
 from studies.hidden.physics.designs import APPROACHES, session
 from studies.hidden.physics.generate import Case, generate
 from studies.hidden.physics.geometry import GRAVITY
-from studies.hidden.physics.kinds import (
-    EFFECTS,
-    NOWHERE,
-    OF_ROBOT,
-    OUTSIDE,
-    UNFORESEEN,
-    Cause,
-)
+from studies.hidden.physics.kinds import EFFECTS, NOWHERE, OF_ROBOT, OUTSIDE, UNFORESEEN, Cause
 from studies.hidden.physics.measuring import NOISES, Noise, Sensor, observe
 from studies.hidden.physics.oracle import oracle, visible_outside
 

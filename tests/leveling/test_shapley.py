@@ -10,11 +10,7 @@ from accelstudy.basics.units import GON
 from accelstudy.design.estimability import estimability
 from accelstudy.leveling.angles import specific_force, tilt_by_output, tilt_slope
 from accelstudy.leveling.sensitivity import leveling_function, leveling_sensitivity
-from accelstudy.leveling.shares import (
-    leveling_shares,
-    linear_shapley,
-    order_changes,
-)
+from accelstudy.leveling.shares import leveling_shares, linear_shapley, order_changes
 from accelstudy.schemes import get_scheme
 from accelstudy.simulation.sessions import Noise
 

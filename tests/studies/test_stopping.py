@@ -10,12 +10,7 @@ from scipy import stats
 from accelstudy.schemes import get_scheme
 from studies.positions import efficiency
 from studies.positions.efficiency import efficiency_figure, efficiency_table
-from studies.positions.stopping import (
-    RULES,
-    plain,
-    simulate,
-    summary_table,
-)
+from studies.positions.stopping import RULES, plain, simulate, summary_table
 
 SETTINGS = [*product(("gravity", "robot"), RULES, (1.0,), (0,), (150,))]
 
