@@ -1,7 +1,7 @@
 """The calibration of an accelerometer: its equations, its estimates and their statistics.
 
 Derivatives against finite differences, the robot adjustment against the paper's own equations,
-exact data, invariances, and a seeded Monte Carlo against closed forms and published numbers. Limits
+invariances, and a seeded Monte Carlo against closed forms and published numbers. Limits
 of statistical assertions are 4.5 standard errors.
 """
 
@@ -113,23 +113,6 @@ def test_robot_adjustment_is_that_of_the_papers_equations():
     np.testing.assert_allclose(components.sigma_priori, paper.sigma_priori, rtol=1e-6)
     correlation = [r.cofactors / (sigma[:, None] * sigma[..., None]) for r in (components, paper)]
     np.testing.assert_allclose(*correlation, atol=1e-6)
-
-
-# --- exact data ----------------------------------------------------------------------------------
-
-
-@pytest.mark.parametrize(("name", "approach"), [
-    (name, approach)
-    for name in MODELS
-    for approach in (GRAVITY, ROBOT)
-    if approach is ROBOT or not name.endswith("crossaxis")  # to which gravity is blind
-])  # fmt: skip
-def test_exact_data_return_the_truth(name, approach):
-    model = get_model(name)
-    result = calibrate(model, approach, ideal_session(model=model).observations(Noise()))
-    assert result.converged.all()
-    np.testing.assert_allclose(result.parameters[0], model.vector(TRUTH), rtol=0, atol=1e-10)
-    assert result.omega[0] < 1e-12
 
 
 # --- Monte Carlo ---------------------------------------------------------------------------------

@@ -69,28 +69,21 @@ def test_the_rate_is_that_of_the_samples(tmp_path, turned):
 
 @pytest.mark.parametrize("unit", ["m/s^2", "counts"])
 def test_frames(turned, unit):
-    """A log in other axes makes the same campaign; counts stay counts, whatever their sign."""
+    """A log in other axes makes the same campaign; numbers with a scale are and stay counts."""
     forces, _ = turned
     raw, how = parse_frame("flu").from_frd(forces), {"rate": RATE, "frame": "FLU"}
     if unit == "counts":
         raw = raw / [0.001, 0.002, 0.003] + [100.0, 200.0, 300.0]
-        how |= {"unit": unit, "scale": "0.001,0.002,0.003", "offset": "100,200,300"}
+        how |= {"scale": "0.001,0.002,0.003", "offset": "100,200,300"}
     found = acs.find_holds(table(raw), **how)
     assert any("axes: flu in the log" in note for note in found.notes)
     expected = acs.find_holds(table(forces), rate=RATE)
     np.testing.assert_allclose(found.forces, expected.forces, rtol=1e-9)
     np.testing.assert_allclose(found.sd, expected.sd, rtol=1e-9)
     assert found.header.log.frame == "flu"
+    assert found.header.unit == unit
     if unit == "counts":
         np.testing.assert_array_equal(found.header.nominal.scale, [0.001, -0.002, -0.003])
-
-
-def test_numbers_with_a_scale_are_counts(turned):
-    raw = turned[0] / 0.001
-    expected = acs.find_holds(table(raw), rate=RATE, unit="counts", scale=0.001)
-    found = acs.find_holds(table(raw), rate=RATE, scale=0.001)
-    assert found.header.unit == expected.header.unit == "counts"
-    np.testing.assert_array_equal(found.forces, expected.forces)
 
 
 def test_temperature_vibration_and_range(turned):

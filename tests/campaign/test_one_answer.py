@@ -57,6 +57,8 @@ def test_the_tilt_error_of_a_calibration_is_one_number(tmp_path):
     calibration = acs.calibrate(campaign)
     left = calibration.content["quality"]["tilt_rms_mgon"]
     own = np.array([left["roll"], left["pitch"]])
+    for cap in ("45 deg", np.pi / 4):  # 50 gon
+        np.testing.assert_allclose(calibration.tilt_error(cap) / MGON, own, rtol=1e-9)
     advice = acs.advise(campaign, tilt_accuracy="10mgon", tilt_range="50gon")
     np.testing.assert_allclose(advice.rms / MGON, own, rtol=1e-9)
     chance = acs.compare(calibration, calibration).content["tilt"]

@@ -5,14 +5,11 @@ import subprocess
 import sys
 
 import click
-import pandas as pd
 from calling import call, succeed
 from click.testing import CliRunner
-from study_helpers import PROVENANCE
 
 import accelstudy
 from accelstudy.commands.main import main
-from accelstudy.files.tables import write_table
 from accelstudy.sensors.models import MODELS
 
 
@@ -87,18 +84,6 @@ def test_the_unit_of_angles_is_an_option_and_a_variable(monkeypatch):
 
 
 # --- a study -------------------------------------------------------------------------------------
-
-
-def test_claims(tmp_path):
-    row = {
-        "claim": "c", "section": "4.2", "statement": "it holds", "unit": "%", "paper": 50.0,
-        "ours": 41.25, "ci95_low": 40.0, "ci95_high": 42.0, "verdict": "reproduced",
-        "sentence": "So it is.",
-    }  # fmt: skip
-    write_table(tmp_path / "claims.parquet", pd.DataFrame([row]), PROVENANCE)
-    assert output("claims", tmp_path).splitlines()[2:] == [
-        "| 4.2 | it holds | 50.0 % | 41.2 % (40.0 … 42.0) | **reproduced** | So it is. |"
-    ]
 
 
 # --- bad input -----------------------------------------------------------------------------------

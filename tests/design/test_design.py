@@ -45,14 +45,6 @@ def test_gravity_is_blind_to_rotations_and_a_robot_is_not(scheme):
     assert design(scheme, QUADRATIC).estimable is (scheme not in ("faces-6", "d-optimal-9"))
 
 
-def test_observed_gravity_is_a_further_parameter():
-    found = design("mclaren-24", noise=Noise(sigma_gravity=1e-5))
-    assert found.parameter_names == (*NINE.parameter_names, "g")
-    assert found.estimable
-    assert found.redundancy == 15
-    assert found.sigma[-1] == pytest.approx(1e-5)
-
-
 # --- linear theory -------------------------------------------------------------------------------
 
 

@@ -10,7 +10,7 @@ from places import SHARED
 from scipy.optimize import least_squares
 from scipy.spatial.transform import Rotation
 
-from accelstudy.schemes import Scheme, get_scheme, register, registry, scheme_families, scheme_names
+from accelstudy.schemes import Scheme, get_scheme, registry, scheme_families, scheme_names
 from accelstudy.schemes.mclaren import mclaren_orbit
 
 GENERIC = Rotation.from_euler("xyz", [15, 25, 35], degrees=True)
@@ -73,18 +73,6 @@ def test_a_scheme_is_what_its_name_says(name):
     assert found.source
     assert found.status in {"exact", "standard", "stand-in", "generated"}
     np.testing.assert_allclose(np.linalg.norm(found.directions, axis=1), 1, rtol=1e-14)
-
-
-def test_a_registered_scheme_is_found_by_its_name_and_its_family(monkeypatch):
-    monkeypatch.setattr(registry._registry, "_items", dict(registry._registry._all_items))
-
-    @register("test-ring-N", title="ring from {0}", status="generated", source="a test")
-    def ring(n):
-        angle = 2 * np.pi * np.arange(n) / n
-        return np.column_stack([np.zeros(n), np.sin(angle), np.cos(angle)])
-
-    assert get_scheme("test-ring-7").title == "7 ring from 7"
-    assert "test-ring-N" in scheme_families()
 
 
 @pytest.mark.parametrize(

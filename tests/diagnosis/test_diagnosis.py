@@ -115,21 +115,3 @@ def test_the_other_parameters_are_right_with_the_effect(approach):
     before, after = found.base.parameters[:9], found.final.solution.parameters[:9]
     assert np.max(np.abs(np.subtract(after, true) / sigma)) < 4
     assert np.max(np.abs(np.subtract(before, true) / sigma)) > 10
-
-
-ROTATIONS = {
-    *("cross_axis_misalignment", "mounting_rotation", "base_tilt", "encoder_offset"),
-    *("encoder_scale", "encoder_eccentricity", "axis_nonperpendicularity", "joint_compliance"),
-    "mounting_slip",
-}
-"""Effects that only turn the sensor or misread its attitude."""
-
-
-@pytest.mark.parametrize(("approach", "effect", "invisible"), [
-    ("gravity", "mounting_rotation", {"gravity_error", *ROTATIONS}),
-    ("robot", "gravity_error", {"gravity_error"}),
-])  # fmt: skip
-def test_what_an_approach_cannot_see_it_says(approach, effect, invisible):
-    found = diagnose(campaign(3, approach=approach, effects=(effect,)), NINE)
-    assert found.verdict == "no_effect"
-    assert set(found.invisible) == invisible

@@ -6,7 +6,6 @@ from itertools import product
 
 import numpy as np
 import pytest
-import yaml
 from calling import succeed
 from campaign_helpers import made
 
@@ -103,16 +102,6 @@ def test_the_next_position_is_worth_more_than_others(begun):
 
 
 # --- the noise -----------------------------------------------------------------------------------
-
-
-def test_a_noise_that_the_residuals_refute_is_not_trusted(begun):
-    folder = begun(24)
-    header = yaml.safe_load((folder / "campaign.yaml").read_text(encoding="utf-8"))
-    header["sensor_noise"]["sigma_mps2"] = 0.0005
-    (folder / "campaign.yaml").write_text(yaml.safe_dump(header), encoding="utf-8")
-    text = advise(folder)
-    assert "more than the stated 0.5 mm/s^2 allows: it is understated" in text
-    assert "YOU CAN STOP" not in text
 
 
 def test_what_depends_on_more_than_the_attitude(begun):

@@ -190,13 +190,3 @@ def test_effects_of_the_models_causes_and_approaches_have_colours_of_their_own()
     for name in set(effect_names()) - modelled:
         assert style.group_colour(name) == style.CAUSES[style.cause(name)]
     assert {style.cause(name) for name in set(effect_names()) - modelled} == set(style.CAUSES)
-
-
-@pytest.mark.parametrize(("model", "title"), [
-    ("bias-scale-nonorthogonality", "9: + non-orthogonality"),
-    ("bias-scale-base_tilt-hysteresis", "6 + base tilt + hysteresis"),
-    (f"{NINE}+warm_up(tau=300)+quadratic_scale", "9 + warm up (300) + quadratic scale"),
-    ("mine", "mine"),
-])  # fmt: skip
-def test_titles_of_models_are_short(model, title):
-    assert style.model_title(model) == title

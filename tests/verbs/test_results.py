@@ -10,9 +10,7 @@ import matplotlib
 import numpy as np
 import pandas as pd
 import pytest
-import yaml
 from calling import call, succeed
-from gross import unit
 from log_helpers import session
 from matplotlib import pyplot
 from matplotlib.figure import Figure
@@ -159,24 +157,6 @@ def test_a_function_and_its_command_write_the_same(results, verb, tmp_path):
         result.save(other)
 
 
-def test_campaigns_and_advice_are_those_of_the_commands(tmp_path):
-    words = ("--scheme", "faces-6", "--model", "bias", "--sigma", "1mm/s^2", "--interval", "none")
-    succeed("simulate-campaign", *words, "--out", tmp_path / "six", "--truth", tmp_path / "truth")
-    six = acs.simulate_campaign(
-        name="six", scheme="faces-6", model="bias", sigma=1e-3, interval=None
-    )
-    np.testing.assert_allclose(acs.read_campaign(tmp_path / "six").forces, six.forces, rtol=1e-13)
-    assert yaml.safe_load((tmp_path / "truth").read_text(encoding="utf-8")) == six.truth
-
-    said = call("advise", tmp_path / "six", "--tilt-accuracy", "1gon", "--model", "bias").stdout
-    advice = acs.advise(tmp_path / "six", tilt_accuracy="1gon", model="bias")
-    assert (said.strip(), advice.state) == (advice.summary().strip(), "enough")
-    assert advice.to_frame().loc["roll", "wanted_rad"] == pytest.approx(np.pi / 200)
-    advice.save(tmp_path / "advice")
-    kept = json.loads((tmp_path / "advice/advice.json").read_text(encoding="utf-8"))
-    assert (kept["state"], kept["positions"]) == ("enough", [*range(1, 7)])
-
-
 # --- a calibration -------------------------------------------------------------------------------
 
 
@@ -236,23 +216,6 @@ def test_files_of_the_first_versions_still_read():
     how = {"rate": 1, "columns": {axis: axis for axis in log}}
     pd.testing.assert_frame_equal(acs.apply(old, log, **how), acs.apply(new, log, **how))
     assert acs.export(old, form="c").startswith("/*")
-
-
-def test_the_tilt_error_is_that_of_the_report(calibrations):
-    one = calibrations[0]
-    stated = one.content["quality"]["tilt_rms_mgon"]
-    found = one.tilt_error() / (np.pi / 200 * 1e-3)
-    assert found.tolist() == pytest.approx([stated["roll"], stated["pitch"]])
-    in_degrees, in_rad = one.tilt_error("45 deg"), one.tilt_error(np.pi / 4)
-    assert in_degrees.tolist() == pytest.approx(in_rad.tolist())
-
-
-def test_what_reading_refuses_is_diagnosed(tmp_path):
-    given = unit(acs.simulate_campaign(scheme="fibonacci-24"), force=0.102)
-    acs.write_campaign(given, tmp_path, plausible=False)
-    with pytest.raises(acs.InputError, match="look like g"):
-        acs.read_campaign(tmp_path)
-    assert acs.diagnose(acs.read_campaign(tmp_path, plausible=False)).state == "gross_error"
 
 
 # --- the front door ------------------------------------------------------------------------------
