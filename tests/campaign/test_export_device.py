@@ -227,18 +227,6 @@ def test_c_takes_counts_in_the_axes_of_the_log(frame, single):
     np.testing.assert_allclose(force, axes.from_frd(forces), rtol=0, atol=2e-5)
 
 
-def test_a_header_says_what_it_takes_and_where_it_is_from():
-    header = c_header(calibration_with(ALL))
-    comment = " ".join(header[: header.index("*/")].replace("\n *", " ").split())
-    for words in ("temperature: degC", "g = 9.81 m/s^2", "b_T_x = ", "Verdict: accepted"):
-        assert words in comment
-    assert "malloc" not in header
-    for_one = c_header(calibration_with(("bias", "scale")))
-    assert "Newton" not in for_one
-    assert "accel_solve" not in for_one
-    assert "accel_calibrate(const accel_real reading[3], accel_real force[3])" in for_one
-
-
 @cache
 def calibration_of(model):
     """A calibration of a campaign that has the effects beside a model."""

@@ -3,7 +3,7 @@
 import numpy as np
 import pandas as pd
 import pytest
-from log_helpers import RATE, G, find_holds, opened, session
+from log_helpers import RATE, find_holds, opened, session
 
 
 def spans(holds):
@@ -59,20 +59,6 @@ def test_a_frozen_channel_does_not_lower_the_floor(tmp_path):
     assert any("does not change over a window in" in text for text in holds.warnings)
 
 
-def test_saturated_holds_are_left_out(tmp_path):
-    forces, edges = session()
-    level = forces[edges[4, 0] : edges[4, 1], 0].mean()
-    sign = np.sign(level)
-    clipped = forces.copy()
-    clipped[:, 0] = sign * np.minimum(sign * forces[:, 0], abs(level))
-    beyond = [i for i, (a, b) in enumerate(edges) if sign * forces[a:b, 0].mean() > abs(level)]
-    holds = find_holds(opened(tmp_path, clipped))
-    start, end = spans(holds)
-    assert len(start) == len(edges) - 1 - len(beyond)
-    assert not np.any((start >= edges[4, 0]) & (end <= edges[4, 1]))
-    assert any("saturated" in text for text in holds.warnings)
-
-
 def test_override_and_limits(tmp_path):
     forces, edges = session()
     log = opened(tmp_path, forces)
@@ -84,12 +70,6 @@ def test_override_and_limits(tmp_path):
     longer = find_holds(log, trim=0.5)
     np.testing.assert_array_equal(spans(longer).T, spans(chosen).T + np.array([30, -30]))
     assert len(edges) == len(chosen.table)
-
-
-def test_a_log_at_rest_is_one_hold(tmp_path):
-    forces = [0, 0, G] + 0.02 * np.random.default_rng(1).standard_normal((5000, 3))
-    holds = find_holds(opened(tmp_path, forces))
-    assert holds.table["n"].tolist() == [5000 - 2 * 70]
 
 
 def test_few_holds_in_much_motion(tmp_path):

@@ -6,7 +6,6 @@ from functools import cache
 import numpy as np
 import pytest
 import quotes
-import yaml
 from example_helpers import EXAMPLES, run_example
 from page_helpers import numbers
 from pictures import BATCH, MADE_BY, REPORTS, overview, seen, stale
@@ -69,21 +68,6 @@ def test_the_log_levels_to_what_its_calibration_promised():
     assert "ACCEPTED" in said
 
 
-def test_the_hidden_effect_is_found_and_explains_the_misfit(run):
-    plain, extended = (
-        quotes.printed("hidden", f"accelstudy calibrate session --approach robot {option}")
-        for option in ("--out plain", "--model")
-    )
-    assert "REJECTED" in plain
-    assert "ACCEPTED" in extended
-    assert "it is thermal bias" in quotes.printed("hidden", "accelstudy diagnose")
-    truth = yaml.safe_load((run("hidden") / "truth.yaml").read_text())["effects"][0]["parameters"]
-    found = of_lines(extended)
-    for parameter in truth:
-        value, sigma = found[parameter["name"]][:2]
-        assert abs(value - 1e3 * parameter["value"]) < 3 * sigma
-
-
 def test_to_estimate_the_quadratic_term_pays_from_fifty_positions_on():
     printed = quotes.printed("sweep", "python read").splitlines()
     n, *errors = np.transpose([numbers(line) for line in printed if line[0].isdigit()])
@@ -91,18 +75,6 @@ def test_to_estimate_the_quadratic_term_pays_from_fifty_positions_on():
     assert n.tolist() == [14, 18, 24, 36, 50, 72]
     assert gravity.tolist() == 4 * [False] + 2 * [True]
     assert robot.all()
-
-
-def test_the_diagnosis_finds_an_effect_of_the_readers_own():
-    text = quotes.printed("effect", "python find_ripple")
-    assert "The model lacks ripple" in text
-    assert float(re.search(r"ripple\(period=([\d.]+)\)$", text)[1]) == pytest.approx(5, abs=0.1)
-
-
-def test_the_sides_of_the_box_tell_the_scales_apart():
-    text = quotes.printed("scheme", "python compare")
-    assert re.search("wedge-8 +gravity +rank 8 of 9: s_x, s_y, s_z", text)
-    assert "rank" not in re.search("wedge-sides-8 +gravity.*", text)[0]
 
 
 @pytest.mark.parametrize("name", NAMES)

@@ -1,17 +1,12 @@
 """Commands are made of functions: the same words, the same defaults, the same errors."""
 
 import inspect
-import json
 import pickle
-from io import StringIO
 from typing import Any
 
 import click
-import pandas as pd
 import pytest
-import yaml
-from calling import refusal, succeed
-from study_helpers import content, grid
+from calling import refusal
 
 import accelstudy
 from accelstudy.basics.errors import OPTIONS
@@ -82,39 +77,6 @@ def test_a_wrong_value_ends_in_the_same_line(verb: str, tmp_path: Any) -> None:
             function(verb)(*paths, **given)
         assert line == str(refused.value).replace(keyword.name, keyword.option, 1)
         assert line.startswith(f"{keyword.option}: ")
-
-
-def test_what_is_printed_is_what_the_function_returns(tmp_path: Any) -> None:
-    config = tmp_path / "config.yaml"
-    config.write_text(yaml.safe_dump(content(grids=[grid(schemes=["faces-6", "mclaren-24"])])))
-    campaign = tmp_path / "campaign"
-    accelstudy.write_campaign(accelstudy.simulate_campaign(scheme="faces-edges-18"), campaign)
-
-    def said(*words: Any) -> str:
-        return str(succeed(*words).stdout)
-
-    assert json.loads(said("config-schema")) == accelstudy.config_schema()
-    table = pd.read_csv(StringIO(said("scheme", "faces-6").partition("\n")[2]), index_col=0)
-    pd.testing.assert_frame_equal(table, accelstudy.scheme("faces-6"), atol=1e-6)
-    for kind in ("effects", "models", "public-data"):
-        table, lines = accelstudy.catalogue(kind), said("catalogue", kind).splitlines()
-        assert [line for line in lines if line[0] != " "] == [
-            f"{name}: {first}" for name, first in table.iloc[:, 0].items()
-        ]
-    for name, row in accelstudy.cells(config).iterrows():
-        row_said = [name, str(row["redundancy"]), str(row["replicates"]), *row["reason"].split()]
-        assert row_said in [line.split() for line in said("cells", config).splitlines()]
-    for words, table in (
-        (("schemes", "faces-6", "mclaren-24"), accelstudy.list_schemes(["faces-6", "mclaren-24"])),
-        (("effects", "--scheme", "mclaren-24"), accelstudy.list_effects(scheme="mclaren-24")),
-        (("effects", "--campaign", campaign), accelstudy.list_effects(campaign=campaign)),
-    ):
-        lines = said(*words, "--quiet").splitlines()
-        assert lines[0].split() == " ".join(table.columns).split()
-        assert [line.split()[0] for line in lines[1:]] == table.iloc[:, 0].tolist()
-        assert table.attrs["legend"] in said(*words)
-    pd.testing.assert_frame_equal(accelstudy.list_effects(), accelstudy.catalogue("effects"))
-    assert accelstudy.init(tmp_path / "mine") in said("init", tmp_path / "mine", "--force")
 
 
 def test_keywords_of_an_import_are_the_keys_of_its_settings() -> None:
