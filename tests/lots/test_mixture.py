@@ -9,9 +9,9 @@ from scipy import integrate, stats
 from accelstudy.diagnosis.evidence.size import SIZE_WEIGHTS, SIZES, Level, log_mean
 from accelstudy.effects import get_effect
 from accelstudy.lots.evidence import SensorEvidence, lot_classes
-from accelstudy.lots.lot import LotDiagnosis
+from accelstudy.lots.lot import LotDiagnosis, _settled
 from accelstudy.lots.mixture import PRIOR_ALIKE, PRIOR_ALL, PRIOR_MISSING, PRIOR_ODD, Mixture
-from accelstudy.lots.passes import LEVEL, MIN_CERTAIN, Pass
+from accelstudy.lots.passes import LEVEL, MIN_CERTAIN, LotEffect, Pass
 from accelstudy.lots.sizes import SCATTERS, LotResiduals, TypicalSize
 from accelstudy.sensors.models import get_model
 
@@ -261,6 +261,20 @@ def test_names_between_which_the_lot_does_not_decide_are_reported_as_one_set():
     one = weighed(np.array([[12.0, 12.1, 0.0]] * 12), np.random.default_rng(7))
     assert {*one.found.names} == {*NAMES[:2]}
     assert one.found.posterior > MIN_CERTAIN > max(one.given.values())
+
+
+def test_what_imitates_two_effects_gives_way_beside_one_of_them():
+    imitator, second, first = (
+        LotEffect((name,), 1.0, 1.0, (0.9, 1.0), name, (), np.ones(1)) for name in NAMES
+    )
+    found = {(): imitator, imitator.names: second, second.names: first, first.names: second}
+
+    def beside(effects):
+        return SimpleNamespace(found=found[sum((one.names for one in effects), ())])
+
+    assert _settled([imitator], beside) == [imitator]
+    assert _settled([imitator, second], beside) == [first, second]
+    assert _settled([first, second], beside) == [first, second]
 
 
 def test_names_that_no_campaign_tells_apart_are_one_class():
