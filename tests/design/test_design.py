@@ -6,7 +6,6 @@ from closed_forms import gravity_sigma, has_octahedral_moments, perfect_robot_ra
 from usual import BOTH, GRAVITY, NINE, ROBOT, TWELVE
 
 from accelstudy.adjustment import calibrate
-from accelstudy.basics.units import MGON
 from accelstudy.design.estimability import estimability
 from accelstudy.schemes import get_scheme, scheme_names
 from accelstudy.sensors.models import get_model
@@ -86,27 +85,3 @@ def test_closed_forms_of_a_perfect_robot(scheme):
 def test_schemes_without_octahedral_moments_are_told_apart():
     assert not has_octahedral_moments(get_scheme("random-38").directions)
     assert not has_octahedral_moments(get_scheme("mclaren-24").directions[:-1])
-
-
-# Scheme, m, correlation of the scales, sds of gravity and robot: misalignment (mgon), scale (ppm),
-# bias (mm/s²), each of the worst axis.
-TABLE = [
-    ("faces-edges-18", 0.0556, -0.200, (13.0, 107, 0.82), (5.4, 84, 0.48)),
-    ("rings-24", 0.0417, -0.143, (13.0, 85, 0.71), (4.7, 73, 0.42)),
-    ("rhombicuboctahedron-24", 0.0688, -0.260, (10.1, 104, 0.71), (4.7, 73, 0.42)),
-    ("mclaren-24", 0.0667, -0.250, (10.3, 102, 0.71), (4.7, 73, 0.42)),
-    ("faces-edges-corners-26", 0.0726, -0.279, (9.4, 104, 0.68), (4.5, 70, 0.40)),
-]
-
-
-@pytest.mark.parametrize(("scheme", "m", "correlation", "gravity", "robot"), TABLE)
-def test_table_of_schemes(scheme, m, correlation, gravity, robot):
-    of_gravity, of_robot = design(scheme), design(scheme, approach=ROBOT)
-    assert get_scheme(scheme).fourth_moment == pytest.approx(m, abs=5e-5)
-    cofactors, sigma = of_gravity.cofactors, of_gravity.sigma
-    assert cofactors[3, 4] / (sigma[3] * sigma[4]) == pytest.approx(correlation, abs=5e-4)
-    for found, (misalignment, scale, bias) in ((of_gravity, gravity), (of_robot, robot)):
-        worst = {kind: found.sigma[KINDS[kind]].max() for kind in KINDS}
-        assert worst["nonorthogonality"] / MGON == pytest.approx(misalignment, abs=0.05)
-        assert worst["scale"] * 1e6 == pytest.approx(scale, abs=0.5)
-        assert worst["bias"] * 1e3 == pytest.approx(bias, abs=0.005)

@@ -71,15 +71,6 @@ def test_the_mean_over_attitudes_is_that_over_the_cap(tilt, digits):
 # --- brute force ---------------------------------------------------------------------------------
 
 
-def test_scatter_of_calibrations():
-    f_b = cap_forces(50 * GON, 60)
-    estimates = estimates_about(PAPER, SIGMA)
-    error = leveling_error(NINE, PAPER, NINE, estimates, f_b)
-    expected = brute_force(NINE, PAPER, NINE, estimates, f_b)
-    np.testing.assert_allclose(error.per_replicate, expected, rtol=2e-3)
-    np.testing.assert_allclose(error.rms, np.sqrt(np.mean(expected**2, axis=0)), rtol=1e-3)
-
-
 @pytest.mark.parametrize("g", [9.78, 9.83])
 def test_an_effect_that_the_model_lacks(g):
     """Bias of the model and scatter of the calibration together."""

@@ -221,14 +221,6 @@ def test_files_of_the_first_versions_still_read():
 # --- the front door ------------------------------------------------------------------------------
 
 
-def test_catalogues_are_tables():
-    for kind in ("effects", "models", "schemes", "approaches", "data sheets", "public data"):
-        table = acs.catalogue(kind)
-        assert len(table) > 0
-        assert table.index.is_unique
-    assert "warm_up" in acs.catalogue("effects").index
-
-
 def test_the_front_door_is_light_and_complete():
     """All names are there, for type checkers, too, and none is imported before it is asked for."""
     line = "import sys, accelstudy as a; print(len(a.__all__), 'numpy' in sys.modules)"
