@@ -65,13 +65,6 @@ def test_exchanged_axes_are_recognised_in_poor_data(spoil, axes):
     np.testing.assert_array_equal(found.matrix, np.eye(3)[:, axes])
 
 
-def test_exchanged_angles_of_the_robot_are_recognised():
-    campaign, _ = session(24, np.random.default_rng(25), "robot")
-    found = recognise(campaign.with_arrays(angles=campaign.angles[:, ::-1]))
-    assert found.reason == "roll and pitch of the robot are exchanged"
-    np.testing.assert_array_equal(found.corrected.angles, campaign.angles)
-
-
 def test_a_diagnosis_that_has_no_solution_does_not_advise_a_diagnosis():
     """Of readings that have nothing in common with the attitudes."""
     rng = np.random.default_rng(27)
