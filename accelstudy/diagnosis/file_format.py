@@ -1,15 +1,14 @@
-"""The format of `diagnosis.json`: its keys, what they mean, and what a verdict comes with."""
+"""The format of `diagnosis.json`: its keys and what they mean."""
 
 from __future__ import annotations
 
 from typing import Annotated, Literal, Self
 
-from pydantic import Field, model_validator
+from pydantic import Field
 
 from accelstudy.basics.registry import Setting
 from accelstudy.campaign.calibration.file_format import Correction, Suspect
 from accelstudy.effects import Parameter
-from accelstudy.effects.learned import LEARNED
 from accelstudy.files.documents import Document, Part
 
 Probability = Annotated[float, Field(ge=0, le=1.000001)]
@@ -303,17 +302,6 @@ class Gap(Part):
     confirmed_names: list[str]
     reason: str
 
-    @model_validator(mode="after")
-    def _of_one_mind(self) -> Self:
-        statement, names = self.confirmed_statement, self.confirmed_names
-        if self.confirmed != (statement is not None) or (names and not self.confirmed):
-            raise ValueError("confirmed: must be true where a statement is, and nowhere else")
-        if (statement == "name") != (len(names) == 1):
-            raise ValueError("confirmed_names: must be one where a name is confirmed")
-        if self.confirmed and self.held_out_z is None:
-            raise ValueError("held_out_z: must be given where something is confirmed")
-        return self
-
 
 class UpperLimit(Part):
     """A size that is excluded at 95 %.
@@ -429,16 +417,3 @@ class DiagnosisDocument(Document):
     warnings: list[str]
     rules: dict[str, float]
     calibration: CalibrationFile
-
-    @model_validator(mode="after")
-    def _as_the_verdict_says(self) -> Self:
-        verdict, effects, explained = self.verdict, len(self.effects), bool(self.credible_set)
-        nameless = verdict in ("no_effect", "unknown")
-        if (effects == 0) != nameless or (verdict in ("named", "narrowed") and effects > 3):
-            raise ValueError(f"effects: {effects} do not go with the verdict {verdict}")
-        if explained == (verdict == "no_effect") and verdict not in ("noise_model", "gross_error"):
-            raise ValueError(f"credible_set: does not go with the verdict {verdict}")
-        is_learned = verdict == LEARNED and self.effects[0].name == LEARNED
-        if (self.shape is not None) != is_learned or (verdict == LEARNED) != is_learned:
-            raise ValueError(f"shape: does not go with the verdict {verdict}")
-        return self

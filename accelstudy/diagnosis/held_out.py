@@ -15,7 +15,6 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from itertools import permutations
-from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -29,9 +28,8 @@ from accelstudy.diagnosis.decision.functions import fit_of_place, most_probable_
 from accelstudy.diagnosis.decision.posterior import Posterior
 from accelstudy.diagnosis.decision.problem import Problem, pose
 from accelstudy.diagnosis.decision.refits import refit
-from accelstudy.diagnosis.decision.verdict import Finding
+from accelstudy.diagnosis.decision.statement import Finding
 from accelstudy.diagnosis.evidence.candidates import UNKNOWN, Cause
-from accelstudy.diagnosis.evidence.noise_tests import exceeds_stated, judged_noise
 from accelstudy.diagnosis.rules import RULES
 from accelstudy.diagnosis.space.hypotheses import Hypothesis
 from accelstudy.diagnosis.space.residuals import Residuals
@@ -114,7 +112,7 @@ def _confirm(problem: Problem, finding: Finding, gap: Gap, rng: np.random.Genera
     if isinstance(refitted, str):
         return replace(gap, reason=refitted)
     known = problem.evidence.level.known
-    variance = judged_noise(problem, finding.frame).variance if known else None
+    variance = problem.at(finding.frame).noise_judgement.variance if known else None
     rest = first.observed.take(held)
     test = held_out_gap(base, refitted, rest, held, variance)
     if others:
@@ -124,7 +122,7 @@ def _confirm(problem: Problem, finding: Finding, gap: Gap, rng: np.random.Genera
     gap = replace(gap, held_out=test, confirmed=test.significant)
     alone = finding.verdict == "named" and len(finding.chosen) == 1
     # Of what leaves more than the noise the name may be that of something that is not listed.
-    if not gap.confirmed or not alone or exceeds_stated(problem, finding.frame):
+    if not gap.confirmed or not alone or problem.at(finding.frame).exceeds_stated:
         return gap
     (cause,) = finding.chosen
     # What was found, and all that could leave the same in this campaign.
@@ -195,7 +193,7 @@ def _refit(part: Problem, chosen: Sequence[Cause], place: Place | None) -> Solut
         reason = "the fitted positions alone cannot show such a function"
         return reason if learned is None else learned[1]
     fit = part.refit(alternatives)
-    return "the fit to the fitted positions alone has no solution" if fit is None else fit[1]
+    return "the fit to the fitted positions alone has no solution" if fit is None else fit.solution
 
 
 def _place_of(part: Problem) -> Place | None:
@@ -287,18 +285,17 @@ def held_out_gap(
     """
     if variance is None:
         variance = base.omega / base.redundancy
-    first, second = (_predict(solution, rest) for solution in (base, extended))
-    d = first.white - second.white
-    slope = d @ first.slope
+    (white, slopes), (left, extended_slopes) = (_predict(fit, rest) for fit in (base, extended))
+    d = white - left
+    slope = d @ slopes
     size = float(d @ d + slope @ base.cofactors @ slope)
-    before, after = (float(np.mean(p.white**2)) / variance for p in (first, second))
     cofactors = extended.cofactors / relative_variance(extended, base)
-    spread = float(np.einsum("mu,uv,mv->", second.slope, cofactors, second.slope))
+    spread = float(np.einsum("mu,uv,mv->", extended_slopes, cofactors, extended_slopes))
     return HeldOutGap(
-        before=before,
-        after=after,
+        before=float(np.mean(white**2)) / variance,
+        after=float(np.mean(left**2)) / variance,
         floor=1 + spread / len(d),
-        z=float(d @ first.white / np.sqrt(size * variance)) if size > 0 else 0.0,
+        z=float(d @ white / np.sqrt(size * variance)) if size > 0 else 0.0,
         held=tuple(int(i) for i in held),
     )
 
@@ -308,15 +305,8 @@ def relative_variance(one: Solution, other: Solution) -> float:
     return (one.sigma_force / other.sigma_force) ** 2
 
 
-class _Prediction(NamedTuple):
-    """Misclosures of unit weight in unused positions, (m,), and their derivatives, (m, u)."""
-
-    white: Array
-    slope: Array
-
-
-def _predict(fit: Solution, observed: Observations) -> _Prediction:
-    """Predict positions by a fit to others."""
+def _predict(fit: Solution, observed: Observations) -> tuple[Array, Array]:
+    """Misclosures of unit weight in positions by a fit to others, (m,), and derivatives, (m, u)."""
     at = Residuals.at(fit.model, fit.approach, observed, fit.parameters)
     rows = at.whitening.shape[0] * at.whitening.shape[1]
-    return _Prediction(at.errors[:rows], at.design[:rows])
+    return at.errors[:rows], at.design[:rows]

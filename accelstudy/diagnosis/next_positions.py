@@ -10,12 +10,14 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
-from typing import NamedTuple, TypeAlias
+from typing import TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
 
+from accelstudy.basics.units import GON
 from accelstudy.design.information import Information, position_rows
+from accelstudy.diagnosis.file_format import NextPosition
 from accelstudy.diagnosis.space.frame import SessionFit
 from accelstudy.diagnosis.space.hypotheses import Hypothesis
 from accelstudy.effects import HoldConditions
@@ -43,22 +45,10 @@ Separation: TypeAlias = tuple[tuple[str, ...], tuple[str, ...]]
 """Names that only the one, and that only the other explanation has."""
 
 
-class NextPosition(NamedTuple):
-    """A position worth measuring.
-
-    Attributes
-    ----------
-    roll, pitch : float, rad
-    temperature : float or None, °C; None where it does not matter
-    later : float or None, s after the last position; None where it does not matter
-    separates : Separation
-    """
-
-    roll: float
-    pitch: float
-    temperature: float | None
-    later: float | None
-    separates: Separation
+def separated(first: Explanation, second: Explanation) -> Separation:
+    """Names that only the first, and that only the second of two explanations has."""
+    one, other = ([h.name for h in explanation] for explanation in (first, second))
+    return tuple(n for n in one if n not in other), tuple(n for n in other if n not in one)
 
 
 def next_positions(
@@ -80,8 +70,7 @@ def next_positions(
     both, chosen, last = (first, second), list[NextPosition](), frame.forces[-1]
     effects = (one.effect for one in (*first, *second))
     needed = {c for e in effects for c in compose(e.spec, (e.spec,)).hold_columns}
-    names = [tuple(one.name for one in explanation) for explanation in both]
-    only = [tuple(n for n in a if n not in b) for a, b in (names, names[::-1])]
+    only = separated(first, second)
     designs, free = [_design(frame, one) for one in both], np.array([True])
     values = [np.linalg.pinv(a, rcond=1e-10) @ frame.residuals.errors for a in designs]
     # The first column of either is what the other one predicts.
@@ -93,7 +82,7 @@ def next_positions(
         further = [np.concatenate([seen[1 - k][..., None], rows[k]], axis=-1) for k in (0, 1)]
         gains = np.where(free, sum(map(_separations, before, further)), -np.inf)
         i = first_best(-gains, CRITERION_TOLERANCE * gains.max())
-        chosen.append(_position(frame, hold, i, needed, (only[0], only[1])))
+        chosen.append(_position(frame, hold, i, needed, [*only[0], *only[1]]))
         last = forces[i]
         free = free & (np.linalg.norm(forces - last, axis=1) > MIN_CHANGE * frame.solution.gravity)
         before = [np.concatenate([before[k], further[k][i]]) for k in (0, 1)]
@@ -104,16 +93,23 @@ def _separations(before: Array, further: Array) -> Array:
     """What each of k further positions, (k, c, p), adds to what is known of the first parameter."""
     known = Information.of(before)
     variance = known.covariance[0, 0]
+    if not np.isfinite(variance):  # this explanation has all that the other one predicts
+        return np.zeros(len(further))
     return 1 / (variance - known.gain(further, np.eye(1))) - 1 / variance
 
 
 def _position(
-    frame: SessionFit, hold: HoldConditions, i: int, needed: set[str], separates: Separation
+    frame: SessionFit, hold: HoldConditions, i: int, needed: set[str], separates: list[str]
 ) -> NextPosition:
     """Position of the candidates, with what matters of its conditions."""
     at = {name: float(hold.column(name)[i]) for name in {"roll", "pitch", *needed}}
-    later = at["time"] - float(frame.hold.column("time")[-1]) if "time" in at else None
-    return NextPosition(at["roll"], at["pitch"], at.get("temperature"), later, separates)
+    matters = {}
+    if "temperature" in at:
+        matters["temperature_degC"] = at["temperature"]
+    if "time" in at:
+        matters["later_s"] = at["time"] - float(frame.hold.column("time")[-1])
+    roll, pitch = at["roll"] / GON, at["pitch"] / GON
+    return NextPosition(roll_gon=roll, pitch_gon=pitch, separates=separates, **matters)
 
 
 def _candidates(frame: SessionFit, needed: set[str], before: Array) -> tuple[Array, HoldConditions]:

@@ -21,20 +21,10 @@ from accelstudy.approaches import Approach
 from accelstudy.campaign.calibration.fit import usual_approach
 from accelstudy.campaign.gross_errors.recognition import recognise
 from accelstudy.campaign.session import Campaign
-from accelstudy.diagnosis.decision.functions import learn_function
-from accelstudy.diagnosis.decision.problem import Problem, fit_base, pose
-from accelstudy.diagnosis.decision.verdict import (
-    Finding,
-    Reason,
-    add_certain_effects,
-    dismiss_weak_evidence,
-    explain,
-    judge_noise,
-)
-from accelstudy.diagnosis.evidence.noise_tests import tests_of_noise, worst_of
+from accelstudy.diagnosis.decision.problem import fit_base, pose
+from accelstudy.diagnosis.decision.verdict import decide
 from accelstudy.diagnosis.held_out import gap_of
 from accelstudy.diagnosis.result import CampaignDiagnosis
-from accelstudy.diagnosis.rules import RULES
 from accelstudy.sensors.sensor import SensorModel
 
 
@@ -68,32 +58,3 @@ def diagnose(
     finding = decide(problem, campaign)
     gap = gap_of(problem, finding, split)
     return CampaignDiagnosis(problem, campaign, finding, gap, recognised)
-
-
-def decide(problem: Problem, campaign: Campaign) -> Finding:
-    """Judge the evidence: the first of these rules that matches decides.
-
-    * Only rounding errors are left: nothing is missing.
-    * The evidence that anything is missing is significant, and one explanation, or a few, are
-      probable enough and leave no misfit: they are named.
-    * It is significant, and yet so weak that a calibration accepts its fit, and nothing is certain:
-      nothing is missing, unless a test of the noise fails.
-    * One coordinate and target have what is missing: its function is learned.
-    * Whatever else is significant is unknown; what is certain of it is added.
-    * A test of the noise fails: the noise is not as it is said to be, or an effect looks like it.
-    * Nothing is missing.
-    """
-    if problem.exact:
-        return Finding("no_effect", problem.frame, Reason.of("exact"))
-    nothing = Finding("no_effect", problem.frame)
-    if problem.detection.p_value < RULES.level(problem.evidence.level.known):
-        explained = explain(problem)
-        finding = add_certain_effects(problem, explained)
-        if finding.verdict != "unknown":
-            return finding
-        dismissed = dismiss_weak_evidence(problem, finding)
-        if dismissed is None:
-            return learn_function(problem, explained.posterior, finding) or finding
-        nothing = dismissed
-    worst = worst_of(tests_of_noise(problem, campaign, problem.frame))
-    return nothing if worst is None else add_certain_effects(problem, judge_noise(problem, worst))

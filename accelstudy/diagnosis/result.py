@@ -6,54 +6,61 @@ from collections import defaultdict
 from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import cached_property
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy import special
 
 from accelstudy.adjustment.quality import GlobalTest, Solution, global_test, suspects
-from accelstudy.approaches import Approach
 from accelstudy.basics.progress import stage
 from accelstudy.campaign.calibration.campaign_fit import OUTLIER_LEVEL, NoiseJudgement
 from accelstudy.campaign.gross_errors.recognition import Recognition
 from accelstudy.campaign.session import Campaign
-from accelstudy.diagnosis.consequences import TiltErrors, tilt_errors
-from accelstudy.diagnosis.decision.functions import shares_of_places
+from accelstudy.diagnosis.decision.functions import LearnedShape, shape_of, shares_of_places
 from accelstudy.diagnosis.decision.posterior import Explanation
 from accelstudy.diagnosis.decision.problem import Problem
 from accelstudy.diagnosis.decision.refits import with_settings
-from accelstudy.diagnosis.decision.statement import Part
-from accelstudy.diagnosis.decision.verdict import (
-    Finding,
-    Reason,
-    p_coloured,
-    reason_of_unrecorded,
+from accelstudy.diagnosis.decision.statement import Finding, Part, Reason
+from accelstudy.diagnosis.decision.verdict import p_coloured, reason_of_unrecorded
+from accelstudy.diagnosis.evidence.candidates import UNKNOWN
+from accelstudy.diagnosis.evidence.noise import LEVEL, NoiseTest, worst_of
+from accelstudy.diagnosis.file_format import (
+    Estimate,
+    Fit,
+    Found,
+    LikelyPlace,
+    NextPosition,
+    UpperLimit,
 )
-from accelstudy.diagnosis.evidence.candidates import UNKNOWN, Cause
-from accelstudy.diagnosis.evidence.detection import Detection
-from accelstudy.diagnosis.evidence.noise_tests import (
-    LEVEL,
-    NoiseTest,
-    exceeds_stated,
-    judged_noise,
-    tests_of_noise,
-    worst_of,
-)
-from accelstudy.diagnosis.file_format import Estimate, Fit, Found, LikelyPlace, UpperLimit
-from accelstudy.diagnosis.held_out import Gap
-from accelstudy.diagnosis.next_positions import NextPosition, next_positions
+from accelstudy.diagnosis.held_out import Gap, relative_variance
+from accelstudy.diagnosis.next_positions import Separation, next_positions, separated
 from accelstudy.diagnosis.rules import RULES
-from accelstudy.diagnosis.shape import LearnedShape, shape_of
 from accelstudy.diagnosis.space.frame import SessionFit
-from accelstudy.diagnosis.space.hypotheses import OUTLIER
+from accelstudy.diagnosis.space.hypotheses import OUTLIER, Hypothesis
 from accelstudy.diagnosis.space.shapes import Place
 from accelstudy.diagnosis.visibility import upper_limits
 from accelstudy.effects.learned import LEARNED
+from accelstudy.leveling.error import attitudes_in_use, tilt_error
 from accelstudy.sensors.plausibility import implausible_parameters
 from accelstudy.sensors.sensor import SensorModel
 
 MISSING = ("named", "narrowed", "learned", "unknown")
 """Verdicts by which the model lacks something."""
+
+
+class TiltErrors(NamedTuple):
+    """Rms of roll and pitch that calibrations leave, rad.
+
+    Attributes
+    ----------
+    promised : float, by the base model, as a simulation with it finds
+    before, after : float, by the base model and by the extended one if the extended one is right
+    """
+
+    promised: float
+    before: float
+    after: float
 
 
 @dataclass(frozen=True)
@@ -76,11 +83,6 @@ class CampaignDiagnosis:
     recognised: Recognition | None = None
 
     @property
-    def detection(self) -> Detection:
-        """Test whether anything is missing, of all candidates together."""
-        return self.problem.detection
-
-    @property
     def base(self) -> Solution:
         """Fit of the base model."""
         return self.problem.base.solution
@@ -94,11 +96,6 @@ class CampaignDiagnosis:
     def final(self) -> SessionFit:
         """Session of the fit with what was found, or of the base fit."""
         return self.finding.frame
-
-    @property
-    def approach(self) -> Approach:
-        """Approach of the calibration."""
-        return self.base.approach
 
     @property
     def model(self) -> SensorModel:
@@ -133,11 +130,6 @@ class CampaignDiagnosis:
     def p_coloured(self) -> float:
         """Probability of coloured noise that may be an effect of an absent column."""
         return p_coloured(self.problem, self.finding)
-
-    @property
-    def code(self) -> str:
-        """Code of the reason; empty if there is none."""
-        return self.reason.code
 
     @cached_property
     def credible_set(self) -> tuple[Explanation, ...]:
@@ -183,40 +175,36 @@ class CampaignDiagnosis:
             name = worst.name
         return Found.of_name(name, posterior.p_noise)
 
-    def _chosen_causes(self) -> list[Found]:
+    def _chosen_causes(self) -> Iterator[Found]:
         """What was chosen, with its estimates."""
         solution, chosen = self.final.solution, self.finding.chosen
         cofactors = with_settings(self.frame, solution, [one.shape for one in chosen])
         sigma = np.sqrt(np.diag(cofactors) * self.noise.variance).tolist()
         each = zip(solution.parameters.tolist(), sigma, strict=False)
         values = dict(zip(solution.model.parameter_names, each, strict=False))
-        searched = iter(sigma[len(solution.parameters) :])
-        return [self._describe(cause, values, searched) for cause in chosen]
-
-    def _describe(
-        self, cause: Cause, values: dict[str, tuple[float, float]], searched: Iterator[float]
-    ) -> Found:
-        """Describe a cause by the values of all parameters, and sigmas of the log settings."""
-        best, members = cause.shape, cause.members
-        if best.place is not None:
-            at = int(self.campaign.positions[best.place])
-            return Found.of_name(OUTLIER, cause.posterior, at)
-        effect = best.distinguishable
-        # What is beside a large effect was found in what its refit leaves.
-        (here,) = (None,) if best.name == LEARNED else self.frame.hypotheses((best.effect,))
-        like = () if here is None else self.frame.imitators(here)
-        smooth = [s for s in best.effect.takes if s.name == best.smooth]
-        of_logs = zip(smooth, searched, strict=False)
-        return Found(
-            name=best.name,
-            spec=best.effect.spec,
-            position=None,
-            equivalence_class=members,
-            posterior=cause.posterior,
-            parameters=[Estimate.of(q, *values[q.name]) for q in effect.parameters],
-            settings=[Estimate.of(s, best.value, best.value * log) for s, log in of_logs],
-            imitators=[other for other in like if other not in members],
-        )
+        of_logs = iter(sigma[len(solution.parameters) :])
+        for cause in chosen:
+            best, members = cause.shape, cause.members
+            if best.place is not None:
+                at = int(self.campaign.positions[best.place])
+                yield Found.of_name(OUTLIER, cause.posterior, at)
+                continue
+            # What is beside a large effect was found in what its refit leaves.
+            (here,) = (None,) if best.name == LEARNED else self.frame.hypotheses((best.effect,))
+            like = () if here is None else self.frame.imitators(here)
+            searched = [s for s in best.effect.takes if s.name == best.smooth]
+            yield Found(
+                name=best.name,
+                spec=best.effect.spec,
+                position=None,
+                equivalence_class=members,
+                posterior=cause.posterior,
+                parameters=[
+                    Estimate.of(q, *values[q.name]) for q in best.distinguishable.parameters
+                ],
+                settings=[Estimate.of(s, best.value, best.value * next(of_logs)) for s in searched],
+                imitators=[other for other in like if other not in members],
+            )
 
     @cached_property
     def probabilities(self) -> dict[str, float]:
@@ -241,19 +229,19 @@ class CampaignDiagnosis:
         return self.problem.evidence.level.known
 
     @cached_property
-    def noise(self) -> NoiseJudgement:
-        """Whether the residuals of the final fit bear sigma, and the variance that is quoted."""
-        return judged_noise(self.problem, self.final)
+    def after(self) -> Problem:
+        """The problem that the final fit poses."""
+        return self.problem.at(self.final)
 
     @property
-    def exceeds_stated(self) -> bool:
-        """Whether sigma is given, and the residuals of the final fit are larger than it allows."""
-        return exceeds_stated(self.problem, self.final)
+    def noise(self) -> NoiseJudgement:
+        """Whether the residuals of the final fit bear sigma, and the variance that is quoted."""
+        return self.after.noise_judgement
 
     @cached_property
     def noise_tests(self) -> tuple[NoiseTest, ...]:
         """Tests of the noise on the residuals of the final fit."""
-        return tests_of_noise(self.problem, self.campaign, self.final)
+        return self.after.noise_tests(self.campaign)
 
     @property
     def sigma_position(self) -> float:
@@ -310,10 +298,27 @@ class CampaignDiagnosis:
 
     @cached_property
     def leveling(self) -> TiltErrors | None:
-        """Tilt errors without and with what was found; None if there is nothing to compare."""
+        """Tilt errors without and with what was found.
+
+        None if there is nothing to compare, or if readings of the extended sensor, which clips,
+        have no tilt. They are taken over all tilts up to 50 gon and over the temperatures, times
+        and changes of position of the campaign. The noise of the leveled reading is not included,
+        nor are effects of the rig, which is absent when the sensor is used.
+        """
         if not self.finding.chosen:
             return None
-        return tilt_errors(self.base, self.final.solution, self.frame.hold, self.noise.variance)
+        base, extended, hold = self.base, self.final.solution, self.frame.hold
+        f_b, used = attitudes_in_use(hold, self.campaign.n_positions, extended.gravity)
+
+        def rms(right: Solution, fit: Solution) -> float:
+            truth, u = right.parameters[: right.model.n_parameters], fit.model.n_parameters
+            own, g = fit.parameters[:u], extended.gravity
+            error = tilt_error(right.model, truth, fit.model, own, f_b, g, used)
+            ratio = self.noise.variance * relative_variance(extended, fit)
+            return float(np.sqrt(np.mean(error.rms_of_all(ratio * fit.cofactors[:u, :u]) ** 2)))
+
+        errors = TiltErrors(rms(base, base), rms(extended, base), rms(extended, extended))
+        return errors if np.isfinite(errors).all() else None
 
     @property
     def better_for_leveling(self) -> str | None:
@@ -333,17 +338,26 @@ class CampaignDiagnosis:
             names += [name for alike in classes for name in alike]
         return tuple(upper_limits(self.final, self.noise.trusted, names))
 
+    @property
+    def _rivals(self) -> tuple[tuple[Hypothesis, ...], ...]:
+        """Shapes of the two most probable explanations, where further positions can decide."""
+        if self.finding.verdict not in ("named", "narrowed", "unknown"):
+            return ()
+        rivals = [one.best for one in self.finding.credible_set if one.is_effects]
+        return tuple(rivals[:2]) if len(rivals) > 1 else ()
+
     @cached_property
     def next_positions(self) -> tuple[NextPosition, ...]:
         """Positions that tell the two most probable explanations apart."""
-        finding = self.finding
-        if finding.verdict not in ("named", "narrowed", "unknown"):
-            return ()
-        rivals = [one.best for one in finding.credible_set if one.is_effects]
-        if len(rivals) < 2:
+        if not self._rivals:
             return ()
         with stage("next positions"):
-            return tuple(next_positions(self.frame, *rivals[:2]))
+            return tuple(next_positions(self.frame, *self._rivals))
+
+    @property
+    def separated(self) -> Separation:
+        """Names that only the one, and that only the other of these explanations has."""
+        return separated(*self._rivals)
 
     @cached_property
     def suspects(self) -> dict[int, float]:
@@ -351,7 +365,7 @@ class CampaignDiagnosis:
         base = self.base
         if self.problem.exact:
             return {}
-        trusted = judged_noise(self.problem, self.frame).trusted
+        trusted = self.problem.noise_judgement.trusted
         marked = suspects(base.model, base.approach, base.observed, OUTLIER_LEVEL, trusted)
         return {int(self.campaign.positions[s.position]): s.p_value for s in marked}
 

@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from accelstudy.basics.units import STANDARD_GRAVITY
+from accelstudy.basics.units import GON, STANDARD_GRAVITY
 from accelstudy.effects import HoldConditions
 from accelstudy.leveling.angles import angles_of, roll_pitch, tilt_slope, wrap_angle
 from accelstudy.sensors.sensor import SensorModel
@@ -48,6 +48,24 @@ def cap_forces(max_tilt: float, attitudes: int, g: float = STANDARD_GRAVITY) -> 
     radius = np.sqrt(1 - z * z)
     force = -g * np.stack([radius * np.cos(azimuth), radius * np.sin(azimuth), z], axis=-1)
     return force.reshape(-1, 3)[np.argsort(GOLDEN * np.arange(z.size) % 1)]
+
+
+def attitudes_in_use(hold: HoldConditions, n: int, g: float) -> tuple[Array, HoldConditions]:
+    """Return all tilts up to `MAX_TILT_GON`, and the conditions of a calibration in them.
+
+    Parameters
+    ----------
+    hold : HoldConditions, of the n positions of the calibration
+    n : int
+    g : float, m/s²
+
+    Returns
+    -------
+    f_b : (k, 3) array, m/s²
+    HoldConditions
+    """
+    f_b = cap_forces(MAX_TILT_GON * GON, ATTITUDES, g)
+    return f_b, holds_in_use(hold, n, f_b)
 
 
 def holds_in_use(hold: HoldConditions, n: int, f_b: Array) -> HoldConditions:

@@ -11,16 +11,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from accelstudy.basics.errors import InputError
-from accelstudy.basics.units import GON, MGON
+from accelstudy.basics.units import MGON
 from accelstudy.campaign.calibration.campaign_fit import CampaignFit
 from accelstudy.campaign.calibration.fit import fit_campaign
-from accelstudy.leveling.error import (
-    ATTITUDES,
-    MAX_TILT_GON,
-    cap_forces,
-    holds_in_use,
-    tilt_error,
-)
+from accelstudy.leveling.error import MAX_TILT_GON, attitudes_in_use, tilt_error
 from accelstudy.lots.file_format import Tilt
 from accelstudy.lots.lot import LotDiagnosis
 from accelstudy.lots.passes import LotEffect
@@ -129,8 +123,7 @@ def _parameters_of(found: LotEffect) -> Sequence[str]:
 def _squared_error(fit: CampaignFit, model: SensorModel) -> Array:
     """Square of the error less that by noise: of nested models the difference of covariances."""
     base = replace(fit_campaign(fit.campaign, model, fit.approach), judgement=fit.noise)
-    f_b = cap_forces(MAX_TILT_GON * GON, ATTITUDES, fit.gravity)
-    hold = holds_in_use(fit.campaign.hold, fit.campaign.n_positions, f_b)
+    f_b, hold = attitudes_in_use(fit.campaign.hold, fit.campaign.n_positions, fit.gravity)
     error = tilt_error(
         fit.model, fit.parameters, model, base.parameters, f_b, fit.gravity, hold
     ).constant

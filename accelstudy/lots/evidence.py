@@ -14,7 +14,7 @@ from accelstudy.basics.wording import comma_list, words
 from accelstudy.campaign.session import Campaign
 from accelstudy.diagnosis.decision.problem import BaseFit, fit_base, pose
 from accelstudy.diagnosis.evidence.candidates import UNKNOWN
-from accelstudy.diagnosis.evidence.noise_tests import AXES, COLOUR, LEVEL, TAILS, tail_test
+from accelstudy.diagnosis.evidence.noise import AXES, COLOUR, LEVEL, TAILS, tail_test
 from accelstudy.diagnosis.evidence.size import Evidence, Level
 from accelstudy.diagnosis.rules import RULES
 from accelstudy.diagnosis.space.frame import SessionFit
@@ -130,7 +130,7 @@ class Sensor:
             campaign=self.campaign.name,
             p_value=problem.detection.p_value,
             odds={name: log - nothing for name, log in logs.items()},
-            classes=tuple(one.members for one in problem.classes),
+            classes=tuple(one.members for one in problem.singles.classes),
             specs={name: best[name].effect.spec for name, shapes in effects.items() if shapes},
             shapes={
                 name: tuple(effect.spec for effect in shapes)

@@ -20,7 +20,7 @@ from accelstudy.basics.errors import InputError
 from accelstudy.campaign.calibration.fit import usual_approach
 from accelstudy.campaign.session import Campaign
 from accelstudy.diagnosis.decision.problem import BaseFit
-from accelstudy.diagnosis.evidence.noise_tests import NOISES
+from accelstudy.diagnosis.evidence.noise import NOISES
 from accelstudy.lots.evidence import Sensor, SensorEvidence
 from accelstudy.lots.noise import NoisePrior, noises_of_lot
 from accelstudy.lots.passes import (

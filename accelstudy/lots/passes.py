@@ -14,7 +14,7 @@ from scipy import stats
 
 from accelstudy.basics.progress import track
 from accelstudy.diagnosis.evidence.candidates import UNKNOWN
-from accelstudy.diagnosis.evidence.noise_tests import NOISES
+from accelstudy.diagnosis.evidence.noise import NOISES
 from accelstudy.diagnosis.evidence.size import Level
 from accelstudy.diagnosis.rules import RULES
 from accelstudy.effects import get_effect

@@ -18,7 +18,7 @@ from accelstudy.adjustment.quality import held_out, position_tests, reliability,
 from accelstudy.approaches import get_approach
 from accelstudy.campaign.calibration.fit import fit_campaign
 from accelstudy.campaign.calibration.result import Calibration
-from accelstudy.diagnosis.evidence.noise_models import (
+from accelstudy.diagnosis.evidence.noise import (
     CONTRASTS,
     LENGTHS,
     LOG_RATIOS,

@@ -72,7 +72,7 @@ def test_the_uncertainty_of_a_knee_is_in_all_sigmas():
     campaign = saturated(np.array([0.1, 0.06, 0.12]), 8.8, 2)
     problem, singles = weighed(campaign)
     cause = Cause("saturation", ("saturation",), singles.best["saturation"])
-    (found,), fit = best_refit(problem.frame, singles, [cause])
+    (found,), fit = best_refit(singles, [cause])
     chosen = found.shape
     assert fit.model.parameter_names[6:] == ("k_sat_x", "k_sat_y", "k_sat_z")
 

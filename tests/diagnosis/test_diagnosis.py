@@ -9,7 +9,7 @@ from usual import NINE, G
 
 from accelstudy.adjustment.quality import solve
 from accelstudy.approaches import get_approach
-from accelstudy.diagnosis.decision.verdict import Reason
+from accelstudy.diagnosis.decision.statement import Reason
 from accelstudy.diagnosis.held_out import held_out_gap, split_positions
 from accelstudy.diagnosis.pipeline import diagnose
 from accelstudy.diagnosis.report.words import verdict_lines

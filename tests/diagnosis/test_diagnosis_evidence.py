@@ -11,8 +11,7 @@ from usual import GRAVITY, NINE, ROBOT, G
 from accelstudy.diagnosis.decision.posterior import Explanation, Posterior
 from accelstudy.diagnosis.evidence.candidates import Cause, Field
 from accelstudy.diagnosis.evidence.detection import draw_effects, log_ratio
-from accelstudy.diagnosis.evidence.noise_models import unequal_axes_density
-from accelstudy.diagnosis.evidence.noise_tests import NOISES, misfit, most_evidence
+from accelstudy.diagnosis.evidence.noise import NOISES, most_evidence, unequal_axes_density
 from accelstudy.diagnosis.evidence.size import (
     SHAPE_SIZES,
     SHAPE_WEIGHTS,
@@ -91,7 +90,7 @@ def test_noise_is_not_noise_with_an_effect(frame):
     changed = draw_effects(shapes, 400, rng)
     noise = rng.standard_normal(changed.shape) + residuals.project(changed.T).T
     z = residuals.project(noise.T).T
-    weights = np.exp(-log_ratio(shapes, shapes.parts(z)))
+    weights = np.exp(-log_ratio(shapes, z))
     squares = np.sum(z**2, axis=1)
     r = residuals.redundancy
     assert np.mean(squares) > r + 10
@@ -202,5 +201,5 @@ def test_a_fit_that_misses_more_than_the_noise_is_no_explanation(level, spread, 
     missed = np.tile(spread * rng.standard_normal((24, 3)), (2, 1))
     observed = replace(observed, forces=observed.forces + missed)
     problem = posed(GRAVITY, observed, level)
-    found = misfit(problem, problem.base.solution)
+    found = problem.misfit(problem.base.solution)
     assert (found and found.of_repeats) == of_repeats

@@ -8,7 +8,7 @@ import numpy as np
 import pandas as pd
 import pytest
 from calling import succeed
-from diagnosis_helpers import campaign
+from diagnosis_helpers import assert_consistent, campaign
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
 from usual import GRAVITY, NINE, ROBOT
@@ -17,7 +17,6 @@ import accelstudy as acs
 from accelstudy.basics.errors import InputError
 from accelstudy.basics.units import MGON
 from accelstudy.campaign.format import write_campaign
-from accelstudy.diagnosis.file_format import DiagnosisDocument
 from accelstudy.diagnosis.pipeline import diagnose
 from accelstudy.diagnosis.report.output import Diagnosis
 from accelstudy.diagnosis.report.words import verdict_lines
@@ -186,6 +185,5 @@ def test_every_campaign_has_a_verdict_or_a_reason(keys, spoil):
         found = diagnose(spoil(acs.simulate_campaign(**keys)), NINE)
     except InputError:
         return
-    text = json.dumps(Diagnosis(found).content, allow_nan=False)
-    assert DiagnosisDocument.content(json.loads(text)) == json.loads(text)
+    assert_consistent(json.loads(json.dumps(Diagnosis(found).content, allow_nan=False)))
     assert verdict_lines(found)[0].endswith(".")

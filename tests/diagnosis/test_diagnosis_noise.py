@@ -10,13 +10,14 @@ from scipy import stats
 from usual import BOTH, GRAVITY, ROBOT, G
 
 from accelstudy.diagnosis.evidence.detection import Chance
-from accelstudy.diagnosis.evidence.noise_models import coloured_density, unequal_axes_density
-from accelstudy.diagnosis.evidence.noise_tests import (
+from accelstudy.diagnosis.evidence.noise import (
     axis_test,
     colour_test,
+    coloured_density,
     level_test,
     resolution_test,
     tail_test,
+    unequal_axes_density,
     within_hold_test,
 )
 from accelstudy.diagnosis.evidence.size import Evidence, Level

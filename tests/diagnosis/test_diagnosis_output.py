@@ -11,7 +11,7 @@ import numpy as np
 import pandas as pd
 import pytest
 import yaml
-from diagnosis_helpers import explanation, otherwise
+from diagnosis_helpers import assert_consistent, explanation, otherwise
 from leveling_helpers import leveling_error
 from page_helpers import assert_sound, text_of
 from stand_ins import composed
@@ -22,16 +22,14 @@ from accelstudy.adjustment import calibrate
 from accelstudy.basics.units import GON, MGON, angles_in
 from accelstudy.basics.wording import number
 from accelstudy.campaign.format import write_campaign
-from accelstudy.diagnosis.consequences import TiltErrors
 from accelstudy.diagnosis.decision.posterior import Posterior
-from accelstudy.diagnosis.decision.statement import statement_of
-from accelstudy.diagnosis.decision.verdict import Finding, Reason
-from accelstudy.diagnosis.file_format import DiagnosisDocument
+from accelstudy.diagnosis.decision.statement import Finding, Reason, statement_of
+from accelstudy.diagnosis.decision.verdict import decide
 from accelstudy.diagnosis.held_out import Gap
-from accelstudy.diagnosis.pipeline import decide, diagnose
+from accelstudy.diagnosis.pipeline import diagnose
 from accelstudy.diagnosis.report.output import Diagnosis
 from accelstudy.diagnosis.report.words import verdict_lines
-from accelstudy.diagnosis.result import CampaignDiagnosis
+from accelstudy.diagnosis.result import CampaignDiagnosis, TiltErrors
 from accelstudy.diagnosis.rules import RULES
 from accelstudy.diagnosis.space.frame import SessionFit
 from accelstudy.leveling.error import cap_forces, holds_in_use
@@ -110,7 +108,7 @@ def test_every_verdict_is_written_and_told(written, case):
     one = written(case)
     content, page, out = one.content, one.page, one.folder
     assert content["verdict"] == ("named" if case == "gravity" else case)
-    assert DiagnosisDocument.content(content) == content
+    assert_consistent(content)
     assert HEADLINES[case] in one.diagnosed.verdict
     assert HEADLINES[case] in text_of(page)
     drawn = {path.stem for path in (out / "figures").glob("*.svg")}
@@ -133,7 +131,7 @@ def write_diagnosis(diagnosis, folder):
 def told(diagnosis, folder):
     """The content of diagnosis.json, which fits its model, and the text of the page."""
     content = write_diagnosis(diagnosis, folder)
-    assert DiagnosisDocument.content(content) == content
+    assert_consistent(content)
     page = (folder / "report.html").read_text(encoding="utf-8")
     assert_sound(page)
     return content, text_of(page)
@@ -154,7 +152,7 @@ def test_a_narrowed_diagnosis_is_told_as_a_set(named, tmp_path):
     posterior = Posterior.of(weighed)
     finding = Finding(
         "narrowed", named.final, Reason(), named.finding.chosen, posterior,
-        statement_of(posterior.credible_set, named.problem.cosine),
+        statement_of(posterior.credible_set, named.problem.singles.cosine),
     )  # fmt: skip
     diagnosis = replace(otherwise(named, finding), gap=replace(named.gap, names=()))
     content, text = told(diagnosis, tmp_path)
@@ -180,7 +178,7 @@ def test_what_is_certain_of_the_unknown_is_told_and_in_the_model(named, tmp_path
     posterior = Posterior.of(weighed)
     finding = Finding(
         "unknown", named.final, Reason.of("not in the catalogue"), named.finding.chosen, posterior,
-        statement_of(posterior.all, named.problem.cosine),
+        statement_of(posterior.all, named.problem.singles.cosine),
     )  # fmt: skip
     diagnosis = otherwise(named, finding, next_positions=())
     content, text = told(diagnosis, tmp_path)
@@ -263,7 +261,7 @@ def simulated_sessions(simulated, fitted, d, count=200):
     noise = Noise(d.campaign.sigma_force, d.campaign.header.sigma_angle)
     drawn = ideal.draw(noise, count, np.random.default_rng(1))
     initial = fitted.parameters[: fitted.model.n_parameters]
-    result = calibrate(fitted.model, d.approach, replace(drawn, initial=initial))
+    result = calibrate(fitted.model, d.base.approach, replace(drawn, initial=initial))
     tilts = cap_forces(50 * GON, 60, G)
     used = holds_in_use(d.frame.hold, d.campaign.n_positions, tilts)
     own = result.parameters[:, : fitted.model.n_parameters]

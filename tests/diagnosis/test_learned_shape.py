@@ -7,7 +7,6 @@ from usual import NINE, G
 
 from accelstudy.basics.units import MGON
 from accelstudy.diagnosis.pipeline import diagnose
-from accelstudy.diagnosis.report.document import shape_document
 from accelstudy.diagnosis.report.figures import AXES, shape_figure
 from accelstudy.diagnosis.report.words import verdict_lines
 from accelstudy.effects import get_effect
@@ -52,11 +51,11 @@ def learned():
 
 
 def test_the_table_is_the_function_of_the_model(learned):
-    document = shape_document(learned.shape)
     effect = get_effect(learned.found[0].spec)
     values = dict(zip(learned.extended_model.parameter_names, learned.final.solution.parameters,
                       strict=False))  # fmt: skip
-    grid, table = np.array(document["function"]["coordinate"]), document["function"]
+    table = learned.shape.function
+    grid = np.array(table["coordinate"])
     at = type("Hold", (), {"yaw": grid})
     p = [values[parameter.name] for parameter in effect.parameters]
     for axis, added in zip("xyz", effect.output((0, 0, 0), p, G, at, np), strict=True):

@@ -11,6 +11,7 @@ from accelstudy.basics.levels import REFUTATION_LEVEL
 from accelstudy.campaign.calibration.fit import fit_campaign
 from accelstudy.campaign.calibration.wording import verdict_lines as calibrated_lines
 from accelstudy.diagnosis.decision.problem import SEED, BaseFit, Problem
+from accelstudy.diagnosis.decision.verdict import decide
 from accelstudy.diagnosis.evidence import detection
 from accelstudy.diagnosis.evidence.detection import (
     Chance,
@@ -20,7 +21,7 @@ from accelstudy.diagnosis.evidence.detection import (
 )
 from accelstudy.diagnosis.evidence.size import Level, log_mean
 from accelstudy.diagnosis.held_out import Gap
-from accelstudy.diagnosis.pipeline import decide, diagnose
+from accelstudy.diagnosis.pipeline import diagnose
 from accelstudy.diagnosis.report.words import TEMPLATE, badge, verdict_lines
 from accelstudy.diagnosis.result import CampaignDiagnosis
 from accelstudy.diagnosis.rules import RULES
@@ -57,7 +58,7 @@ def test_noise_alone_counts_as_often_as_the_level_says(designs, approach, level,
         first = replace(residuals, errors=errors[0])
         found, null = (f(field, evidence, first, chance) for f in (detect, null_distribution))
         z = residuals.project(errors.T).T
-        odds = log_mean(field.odds(evidence, field.project(z)))
+        odds = log_mean(field.odds(evidence, z))
         p = np.array([tail_probability(*null, value) for value in odds])
         # Densities of many sets at once are rounded: one or two may move past the observed one.
         assert p[0] == pytest.approx(found.p_value, abs=0.005)
@@ -93,7 +94,7 @@ def test_a_diagnosis_decides_at_the_levels(known, level):
     ):
         vars(problem)["detection"] = replace(problem.detection, p_value=p)
         found = CampaignDiagnosis(problem, measured, decide(problem, measured), Gap(1.0))
-        assert (found.verdict, found.code == "weak") == (verdict, weak)
+        assert (found.verdict, found.reason.code == "weak") == (verdict, weak)
         assert badge(found) == ("accepted" if weak else verdict)
         if weak:
             assert "weak" in verdict_lines(found)[0]

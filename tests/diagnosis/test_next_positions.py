@@ -10,6 +10,7 @@ from usual import GRAVITY, NINE, ROBOT, G
 
 import accelstudy as acs
 from accelstudy.adjustment.quality import solve
+from accelstudy.basics.units import GON
 from accelstudy.campaign.calibration.fit import fit_campaign
 from accelstudy.diagnosis.next_positions import CANDIDATE_SCHEME, candidate_rows, next_positions
 from accelstudy.diagnosis.space.frame import SessionFit
@@ -73,7 +74,7 @@ def test_each_position_adds_most_of_all_candidates(rivals):
     alone = separations(u, old, np.empty((0, 3)), candidates)
     taken = np.empty((0, 3))
     for position in found:
-        force = np.array(specific_force(position.roll, position.pitch, 1.0))
+        force = np.array(specific_force(position.roll_gon * GON, position.pitch_gon * GON, 1.0))
         far = np.linalg.norm(candidates[:, None] - taken, axis=2)
         free = np.all(far > 0.5, axis=1)
         gains = separations(u, old, taken, candidates)
@@ -84,8 +85,15 @@ def test_each_position_adds_most_of_all_candidates(rivals):
         taken = np.vstack([taken, force])
     # Some attitudes would tell much less, so that the choice matters.
     assert np.median(alone) < 0.5 * alone.max()
-    assert found[0].temperature is found[0].later is None
-    assert found[0].separates == (("quadratic_scale",), ("cubic_scale",))
+    assert found[0].temperature_degC is found[0].later_s is None
+    assert found[0].separates == ["quadratic_scale", "cubic_scale"]
+
+
+def test_an_effect_more_is_tested_as_well(rivals):
+    """The larger explanation has all that the smaller one predicts."""
+    frame, (quadratic, cubic), *_ = rivals
+    for both in (((quadratic, cubic), (cubic,)), ((cubic,), (quadratic, cubic))):
+        assert [one.separates for one in next_positions(frame, *both)] == [["quadratic_scale"]] * 3
 
 
 @pytest.mark.parametrize("name", ["quadratic_scale", "encoder_eccentricity"])
@@ -108,10 +116,10 @@ def test_effects_of_time_are_told_apart_later():
     frame = SessionFit.of(fit.solution)
     drift, warm = (frame.candidates[name][0] for name in ("bias_drift", "warm_up"))
     found = next_positions(frame, (drift,), (warm,))
-    assert all(position.temperature is None for position in found)
-    assert [position.later for position in found] == pytest.approx([30 * 60.0] * 3)
-    assert found[0].separates == (("bias_drift",), ("warm_up",))
+    assert all(position.temperature_degC is None for position in found)
+    assert [position.later_s for position in found] == pytest.approx([30 * 60.0] * 3)
+    assert found[0].separates == ["bias_drift", "warm_up"]
     # What both explanations have in common separates nothing.
     quadratic = frame.candidates["quadratic_scale"][0]
     both = next_positions(frame, (drift, quadratic), (warm, quadratic))
-    assert both[0].separates == (("bias_drift",), ("warm_up",))
+    assert both[0].separates == ["bias_drift", "warm_up"]

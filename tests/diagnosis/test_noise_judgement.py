@@ -9,18 +9,15 @@ from diagnosis_helpers import explanation, posed, shuffled
 from scipy import stats
 from usual import GRAVITY, NINE, G
 
-from accelstudy.diagnosis.decision import verdict
 from accelstudy.diagnosis.decision.posterior import Posterior
 from accelstudy.diagnosis.decision.verdict import judge_noise
-from accelstudy.diagnosis.evidence.noise_tests import (
+from accelstudy.diagnosis.evidence.noise import (
     AXES,
     COLOUR,
     LEVEL,
     STEPS,
     TAILS,
     NoiseTest,
-    judged_noise,
-    lack_of_fit,
     worst_of,
 )
 from accelstudy.diagnosis.evidence.size import Level
@@ -85,15 +82,16 @@ def test_where_sigma_is_not_given_the_holds_say_how_large_the_noise_is():
 # --- what follows --------------------------------------------------------------------------------
 
 
-def judged(monkeypatch, name, factor=1.5, of_noise=0.5, fit=0.5):
+def judged(name, factor=1.5, of_noise=0.5, fit=0.5):
     """The finding where a test is significant, and so much of the posterior is of the noise."""
     weighed = [
         explanation(LEVEL, np.log(of_noise)),
         explanation("hysteresis", np.log1p(-of_noise)),
     ]
-    monkeypatch.setattr(verdict, "lack_of_fit", lambda one: fit)
     test = NoiseTest(name, 1.0, 1e-6, (factor,), "what it says")
-    return judge_noise(SimpleNamespace(frame="fit", posterior=Posterior.of(weighed)), test)
+    return judge_noise(
+        SimpleNamespace(frame="fit", posterior=Posterior.of(weighed), lack_of_fit=fit), test
+    )
 
 
 @pytest.mark.parametrize(("case", "said", "code"), [
@@ -106,9 +104,9 @@ def judged(monkeypatch, name, factor=1.5, of_noise=0.5, fit=0.5):
     ({"name": LEVEL, "of_noise": 0.9, "fit": 0.009}, "unknown", "lack of fit"),
     ({"name": STEPS, "fit": 0.009}, "noise_model", "noise"),
 ])  # fmt: skip
-def test_what_a_significant_test_means(monkeypatch, case, said, code):
+def test_what_a_significant_test_means(case, said, code):
     """Larger residuals may be an effect; a misfit that repeats share is no noise, but steps are."""
-    found = judged(monkeypatch, **case)
+    found = judged(**case)
     assert (found.verdict, found.reason.code) == (said, code)
     if code == "noise or effect":
         assert found.reason.facts["p"] == pytest.approx(case["of_noise"])
@@ -143,7 +141,7 @@ def test_lack_of_fit_is_the_analysis_of_variance(missed):
     e = problem.base.solution.misclosures[:, 0]
     pure = np.sum((e[:18] - e[18:]) ** 2) / 2
     f = (np.sum(e**2) - pure) / 9 / (pure / 18)
-    assert lack_of_fit(problem) == pytest.approx(stats.f.sf(f, 9, 18), rel=0.02)
+    assert problem.lack_of_fit == pytest.approx(stats.f.sf(f, 9, 18), rel=0.02)
 
 
 @pytest.mark.parametrize(("level", "scatter", "holds"), [
@@ -155,7 +153,7 @@ def test_lack_of_fit_is_the_analysis_of_variance(missed):
 def test_sigma_is_taken_where_it_is_given_and_not_refuted(level, scatter, holds):
     problem = repeated(level, scatter)
     e = problem.base.solution.misclosures[:, 0] / 0.002
-    judged = judged_noise(problem, problem.frame)
+    judged = problem.noise_judgement
     assert judged.trusted == holds
     variance = 1.0 if holds else np.sum(e**2) / 27
     assert judged.variance == pytest.approx(variance, rel=1e-3)

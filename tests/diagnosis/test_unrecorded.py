@@ -57,7 +57,7 @@ def test_what_nobody_recorded_is_a_function_of_time(robot, columns):
 
 def test_where_it_may_be_slow_noise_as_well_nothing_is_learned():
     found = diagnose(session(wandering, seed=2), NINE)
-    assert (found.verdict, found.code) == ("unknown", "unrecorded")
+    assert (found.verdict, found.reason.code) == ("unknown", "unrecorded")
     said = " ".join(verdict_lines(found))
     assert verdict_lines(found)[0].lower().startswith(CANNOT)
     assert "adequate" not in said
@@ -74,7 +74,7 @@ def test_a_course_that_a_thermometer_shows_is_an_effect():
     t = measured.time / measured.time[-1]
     found = diagnose(measured.with_arrays(temperature=20 + 3 * wandering(t)), NINE)
     assert (found.verdict, found.found[0].name) == ("named", "thermal_bias")
-    assert found.code != "unrecorded"
+    assert found.reason.code != "unrecorded"
     assert found.p_coloured == 0
 
 

@@ -12,6 +12,7 @@ from accelstudy.diagnosis.decision.posterior import Explanation
 from accelstudy.diagnosis.decision.problem import BaseFit, pose
 from accelstudy.diagnosis.evidence.candidates import Cause
 from accelstudy.diagnosis.evidence.size import Level
+from accelstudy.diagnosis.file_format import DiagnosisDocument
 from accelstudy.diagnosis.space.frame import SessionFit
 from accelstudy.effects import HoldConditions
 from accelstudy.schemes import get_scheme
@@ -76,6 +77,24 @@ def otherwise(diagnosis, finding=None, **told):
     changed = replace(diagnosis, finding=finding or diagnosis.finding)
     vars(changed).update(told)
     return changed
+
+
+def assert_consistent(content):
+    """The content of a diagnosis.json fits its model, and its keys do not contradict each other."""
+    assert DiagnosisDocument.content(content) == content
+    verdict, effects, gap = content["verdict"], content["effects"], content["gap"]
+    assert bool(effects) != (verdict in ("no_effect", "unknown"))
+    assert len(effects) <= 3 or verdict not in ("named", "narrowed")
+    if verdict not in ("noise_model", "gross_error"):
+        assert bool(content["credible_set"]) != (verdict == "no_effect")
+    learned = verdict == "learned"
+    assert (content["shape"] is not None) == learned
+    assert not learned or effects[0]["name"] == "learned"
+    statement, names = gap["confirmed_statement"], gap["confirmed_names"]
+    assert gap["confirmed"] == (statement is not None)
+    assert (statement == "name") == (len(names) == 1)
+    assert not gap["confirmed"] or gap["held_out_z"] is not None
+    assert gap["confirmed"] or not names
 
 
 def most(count, level, error=1e-4):

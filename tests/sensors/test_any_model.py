@@ -16,7 +16,7 @@ from accelstudy.campaign.calibration.export import export
 from accelstudy.campaign.calibration.fit import fit_campaign
 from accelstudy.campaign.calibration.sensor_calibration import read_calibration
 from accelstudy.diagnosis.pipeline import diagnose
-from accelstudy.diagnosis.report.document import diagnosed_calibration
+from accelstudy.diagnosis.report.output import Diagnosis
 from accelstudy.sensors.frames import parse_frame
 from accelstudy.sensors.models import get_model
 
@@ -79,7 +79,7 @@ def calibration_of(wrong=lambda campaign: campaign, **settings):
     """A campaign, its diagnosis, and the calibration that this writes."""
     campaign = wrong(acs.simulate_campaign(scheme="fibonacci-30", **settings))
     diagnosis = diagnose(campaign, get_model(NINE))
-    return campaign, diagnosis, diagnosed_calibration(diagnosis)
+    return campaign, diagnosis, Diagnosis(diagnosis).calibration.content
 
 
 IN_G = partial(gross.unit, force=1 / 9.80665)

@@ -8,8 +8,8 @@ from __future__ import annotations
 
 from collections import defaultdict
 from collections.abc import Iterator, Sequence
-from dataclasses import replace
-from typing import NamedTuple
+from dataclasses import dataclass, replace
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,18 +18,17 @@ from scipy import special
 from accelstudy.adjustment.quality import Solution
 from accelstudy.diagnosis.decision.posterior import Posterior
 from accelstudy.diagnosis.decision.problem import Problem
-from accelstudy.diagnosis.decision.refits import refit
-from accelstudy.diagnosis.decision.verdict import Finding, impossible
+from accelstudy.diagnosis.decision.refits import impossible, refit
+from accelstudy.diagnosis.decision.statement import Finding
 from accelstudy.diagnosis.evidence.candidates import UNKNOWN, Cause
-from accelstudy.diagnosis.evidence.noise_tests import misfit
 from accelstudy.diagnosis.evidence.size import Evidence
 from accelstudy.diagnosis.rules import RULES
 from accelstudy.diagnosis.space.frame import SessionFit
-from accelstudy.diagnosis.space.hypotheses import Hypothesis
+from accelstudy.diagnosis.space.hypotheses import Hypothesis, joint_basis
 from accelstudy.diagnosis.space.residuals import Residuals
 from accelstudy.diagnosis.space.shapes import Place
 from accelstudy.effects import get_effect
-from accelstudy.effects.learned import ANGLES, LEARNED, UNITS, LearnedFunction
+from accelstudy.effects.learned import ANGLES, LEARNED, OF_EACH, TARGETS, UNITS, LearnedFunction
 from accelstudy.effects.smooth import CYCLES, LENGTHS
 
 Array = NDArray[np.float64]
@@ -38,6 +37,10 @@ SIZES = np.geomspace(4.0, 4e6, 61)
 """λ of which the most probable one gives the amplitude."""
 MIN_POSTERIOR = 0.01
 """Posterior from which on an explanation counts for a place."""
+MIN_EIGENVALUE = 1e-6
+"""Share of the trace of a covariance below which a direction counts as nothing."""
+POINTS = 121
+"""Values of the coordinate in the table of a function."""
 LAGS = (0.1, 1.0)
 """Lags by which a rate of temperature is taken, as parts of the time between two holds."""
 
@@ -62,7 +65,7 @@ def learn_function(problem: Problem, posterior: Posterior, finding: Finding) -> 
     # What is doubted may be the mean of what the function changes, or a part of the function.
     for beside in (finding.chosen, (*certain, *doubted)):
         fitted = fit_of_place(problem, found.place, [cause.shape for cause in beside])
-        if fitted is not None and not misfit(problem, fitted[1]) and not impossible(fitted[1]):
+        if fitted is not None and not problem.misfit(fitted[1]) and not impossible(fitted[1]):
             chosen = (Cause(LEARNED, (LEARNED,), fitted[0], found.probability), *beside)
             return replace(
                 finding,
@@ -103,7 +106,7 @@ def _cause(problem: Problem, posterior: Posterior, name: str) -> Cause:
     """Effect that an explanation has beside a function, with its probability."""
     having = [one.posterior for one in posterior.all if name in one.names]
     best = problem.frame.candidates[name].strongest(problem.residuals.z)
-    return Cause(name, problem.members[name], best, min(sum(having), 1.0))
+    return Cause(name, problem.singles.members[name], best, min(sum(having), 1.0))
 
 
 def shares_of_places(problem: Problem, names: Sequence[str]) -> dict[Place, float]:
@@ -116,7 +119,7 @@ def shares_of_places(problem: Problem, names: Sequence[str]) -> dict[Place, floa
         left, unknown = left.orthogonal_to(beside), unknown.orthogonal_to(beside)
     if not unknown.places:
         return {}
-    evidence = replace(problem.evidence, redundancy=left.redundancy)
+    evidence = Evidence(problem.base.level, left.redundancy)
     places = unknown.place_densities(evidence, left.z)
     shares = special.softmax([*places.values()]).tolist()
     return dict(zip(places, shares, strict=True))
@@ -188,41 +191,41 @@ def _shape(settings: dict[str, str | float]) -> LearnedFunction:
 
 
 class PlaceShape(NamedTuple):
-    """A shape, and how probable it is of each size.
+    """A shape of a place, of its most probable size λ.
 
     Attributes
     ----------
     effect : LearnedFunction, with the amplitude 1
-    vectors, shares : (m, k) and (k,) arrays, eigenvectors and eigenvalues of K
-    trace : float, of the covariance of the residuals that the amplitude 1 makes
-    logs : (s,) array, log density of the residuals by `SIZES`
+    log_density : float, of the residuals, over all sizes
+    variance : float, square of the amplitude, in units of the variance of unit weight
+    vectors, growth : (m, k) and (k,) arrays, eigenvectors and eigenvalues of λ K
     """
 
     effect: LearnedFunction
+    log_density: float
+    variance: float
     vectors: Array
-    shares: Array
-    trace: float
-    logs: Array
+    growth: Array
 
 
 def weigh_place(
     place: Place, frame: SessionFit, residuals: Residuals, evidence: Evidence
-) -> list[PlaceShape]:
+) -> Iterator[PlaceShape]:
     """Shapes of a place that show in residuals of a frame, weighed by them."""
-    weighed, z = [], residuals.z
+    z = residuals.z
     for effect in shapes_of(place, frame):
         rows = frame.rows(effect) * effect.deviations
         left = residuals.project(rows)
         trace = float(np.sum(left**2))
         if trace > RULES.visible * float(np.sum(rows**2)):
             values, turned = np.linalg.eigh(left.T @ left)
-            significant = values > 1e-6 * trace
+            significant = values > MIN_EIGENVALUE * trace
             vectors = left @ turned[:, significant] / np.sqrt(values[significant])
-            shares = values[significant] / trace
-            along, square = (z @ vectors)[None] ** 2, np.array([z @ z])
-            logs = evidence.densities_by_size(along, shares, square, SIZES)[0]
-            weighed.append(PlaceShape(effect, vectors, shares, trace, logs))
-    return weighed
+            along, shares = (z @ vectors) ** 2, values[significant] / trace
+            logs = evidence.densities_by_size(along[None], shares, np.array([z @ z]), SIZES)[0]
+            size = SIZES[int(np.argmax(logs))]
+            log = float(np.logaddexp.reduce(logs))
+            yield PlaceShape(effect, log, size / trace, vectors, size * shares)
 
 
 def fit_of_place(
@@ -232,29 +235,93 @@ def fit_of_place(
 
     Where no sigma is given, the prior of the function counts beside the noise that it leaves.
     """
-    frame = problem.frame
-    residuals = frame.residuals.orthogonal_to(space_of(beside, len(frame.residuals.z)))
-    z, evidence = residuals.z, replace(problem.evidence, redundancy=residuals.redundancy)
-    shapes = weigh_place(place, frame, residuals, evidence)
+    frame, base, unit = problem.frame, problem.frame.solution, 1.0
+    residuals = frame.residuals.orthogonal_to(joint_basis(beside, len(frame.residuals.z)))
+    z, evidence = residuals.z, Evidence(problem.base.level, residuals.redundancy)
+    shapes = [*weigh_place(place, frame, residuals, evidence)]
     if not shapes:
         return None
-    best = max(shapes, key=lambda one: float(np.logaddexp.reduce(one.logs)))
-    size = SIZES[int(np.argmax(best.logs))]
-    growth, ratio, base = size * best.shares, 1.0, frame.solution
+    best = max(shapes, key=lambda one: one.log_density)
     if not evidence.level.known:
-        taken = np.sum((z @ best.vectors) ** 2 * growth / (1 + growth))
-        ratio = float(np.sqrt(evidence.variance(float(z @ z - taken))))
-        sigma = np.asarray(base.observed.sigma_force) * ratio
+        taken = np.sum((z @ best.vectors) ** 2 * best.growth / (1 + best.growth))
+        unit = evidence.variance(float(z @ z - taken))
+        sigma = np.asarray(base.observed.sigma_force) * np.sqrt(unit)
         base = replace(base, observed=replace(base.observed, sigma_force=sigma))
-    amplitude = float(f"{ratio * np.sqrt(size / best.trace):.4g}")
+    amplitude = float(f"{np.sqrt(unit * best.variance):.4g}")
     effect = type(best.effect)(**{**best.effect.settings, "amplitude": amplitude})
-    seen = best.vectors[:, growth > 1]
+    seen = best.vectors[:, best.growth > 1]
     hypothesis = Hypothesis(LEARNED, effect, np.eye(len(effect.parameters)), seen, seen)
     solution = refit(base, [*beside, hypothesis])
     return None if solution is None else (hypothesis, solution)
 
 
-def space_of(beside: Sequence[Hypothesis], m: int) -> Array:
-    """Orthonormal basis of the spaces of some hypotheses."""
-    columns: list[Array] = [np.zeros((m, 0)), *(one.basis for one in beside)]
-    return np.linalg.qr(np.concatenate(columns, axis=1))[0]
+# --- its table ----------------------------------------------------------------------------------
+
+
+@dataclass(frozen=True)
+class LearnedShape:
+    """A function h of a coordinate that was learned, without a name in the catalogue.
+
+    Attributes
+    ----------
+    effect : LearnedFunction
+    axes : tuple of str, those of its c components in which it shows
+    grid : (k,) array, the coordinate, SI
+    values, sigmas : (k, c) arrays, h and its sigma there, SI
+    """
+
+    effect: LearnedFunction
+    axes: tuple[str, ...]
+    grid: Array
+    values: Array
+    sigmas: Array
+
+    @property
+    def components(self) -> tuple[str, ...]:
+        """Components that have a function."""
+        return TARGETS[self.effect.target][0]
+
+    @property
+    def unit(self) -> str:
+        """SI unit of the values."""
+        return TARGETS[self.effect.target][1]
+
+    @property
+    def function(self) -> dict[str, Any]:
+        """The function as a table, SI."""
+        return {
+            "unit": self.unit,
+            "coordinate": self.grid.tolist(),
+            "value": dict(zip(self.components, self.values.T.tolist(), strict=True)),
+            "sigma": dict(zip(self.components, self.sigmas.T.tolist(), strict=True)),
+        }
+
+    @property
+    def extents(self) -> dict[str, float]:
+        """How far the function goes up and down in the session, by the axes in which it shows."""
+        extents = zip(self.components, np.ptp(self.values, axis=0).tolist(), strict=True)
+        return {name: extent for name, extent in extents if name in self.axes}
+
+
+def shape_of(finding: Finding, variance: float) -> LearnedShape:
+    """Tabulate the function that was learned.
+
+    Parameters
+    ----------
+    finding : Finding, whose first choice is the function
+    variance : float, of unit weight
+    """
+    effect, frame, solution = finding.chosen[0].shape.effect, finding.frame, finding.frame.solution
+    assert isinstance(effect, LearnedFunction)
+    at = coordinate_values(effect, frame)
+    if effect.coordinate not in (*OF_EACH, "angle"):
+        at = at[:, :1]
+    grid = np.linspace(at.min(), at.max(), POINTS)
+    names = list(solution.model.parameter_names)
+    own = [names.index(parameter.name) for parameter in effect.parameters]
+    parameters, cofactors = solution.parameters[own], solution.cofactors[np.ix_(own, own)]
+    values, sigmas = effect.function(grid, parameters, variance * cofactors)
+    most = np.max(np.abs(values) / sigmas, axis=0)
+    shown = most >= min(RULES.z_component, most.max())
+    axes = np.array(TARGETS[effect.target][0])[shown].tolist()
+    return LearnedShape(effect, tuple(axes), grid, values, sigmas)

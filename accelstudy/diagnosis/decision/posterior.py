@@ -18,7 +18,7 @@ import numpy as np
 from scipy import special
 
 from accelstudy.diagnosis.evidence.candidates import UNKNOWN, Cause
-from accelstudy.diagnosis.evidence.noise_tests import NOISES
+from accelstudy.diagnosis.evidence.noise import NOISES
 from accelstudy.diagnosis.rules import RULES
 from accelstudy.diagnosis.space.hypotheses import Hypothesis
 from accelstudy.effects import effect_names

@@ -5,44 +5,39 @@ Each piece of the evidence is weighed when it is asked for, and then kept.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy import special
 
-from accelstudy.adjustment.quality import Solution, column_basis, solve
+from accelstudy.adjustment.quality import Solution, pooled_variance, solve
 from accelstudy.approaches import Approach
 from accelstudy.basics.errors import InputError
+from accelstudy.basics.levels import REFUTATION_LEVEL
+from accelstudy.campaign.calibration.campaign_fit import NoiseJudgement
 from accelstudy.campaign.calibration.fit import fit_campaign, least_sigma
 from accelstudy.campaign.session import Campaign
 from accelstudy.diagnosis.decision.posterior import NOT_LISTED, Explanation, Posterior
-from accelstudy.diagnosis.decision.refits import best_refit
-from accelstudy.diagnosis.evidence.candidates import (
-    Cause,
-    Field,
-    Singles,
-    classes_of,
-    equivalents,
-    unknown_beside,
-    weigh_singles,
-)
+from accelstudy.diagnosis.decision.refits import Refit, best_refit
+from accelstudy.diagnosis.evidence import noise
+from accelstudy.diagnosis.evidence.candidates import Cause, Field, Singles, weigh_singles
 from accelstudy.diagnosis.evidence.detection import Chance, Detection, detect
-from accelstudy.diagnosis.evidence.noise_models import coloured_density, unequal_axes_density
-from accelstudy.diagnosis.evidence.noise_tests import (
-    AXES,
-    COLOUR,
-    LEVEL,
-    TAILS,
-    most_evidence,
-    tail_test,
-)
+from accelstudy.diagnosis.evidence.noise import AXES, COLOUR, LEVEL, TAILS, NoiseTest
 from accelstudy.diagnosis.evidence.sets import set_prior, weigh_sets
 from accelstudy.diagnosis.evidence.size import Evidence, Level
 from accelstudy.diagnosis.rules import RULES
 from accelstudy.diagnosis.space.frame import SessionFit
-from accelstudy.diagnosis.space.hypotheses import Spaces, cosines, repeats_of
+from accelstudy.diagnosis.space.hypotheses import (
+    Spaces,
+    clusters,
+    joint_basis,
+    repeats_of,
+    space_of_attitudes,
+)
 from accelstudy.diagnosis.space.residuals import Residuals
 from accelstudy.diagnosis.space.shapes import LearnedShapes
 from accelstudy.sensors.sensor import SensorModel
@@ -131,6 +126,14 @@ def fit_base(campaign: Campaign, model: SensorModel, approach: Approach) -> Base
 # --- all that may be missing --------------------------------------------------------------------
 
 
+class Misfit(NamedTuple):
+    """Ratio of the residuals of a fit to the noise."""
+
+    ratio: float
+    of_repeats: bool
+    """Whether the noise is what repeated positions differ by, and not what is stated."""
+
+
 @dataclass(frozen=True)
 class Problem:
     """A fit, all that its model may lack or that may be wrong with its noise, and the evidence.
@@ -192,45 +195,32 @@ class Problem:
         return weigh_singles(self.frame, self.evidence)
 
     @cached_property
-    def members(self) -> Mapping[str, tuple[str, ...]]:
-        """Names that mean the same as each candidate."""
-        return equivalents(self.frame, self.singles)
-
-    @cached_property
-    def classes(self) -> list[Cause]:
-        """Candidates with those that mean the same, strongest evidence first."""
-        return classes_of(self.singles, self.members)
-
-    @cached_property
     def alone(self) -> list[Explanation]:
         """Explanations by one effect, one outlying position, or something unknown."""
-        each, unknown = -np.log(max(len(self.classes), 1)), self.unknown
-        densities = self.singles.densities
-        alone = [Explanation((one,), densities[one.name] + each) for one in self.classes]
-        if unknown is not None:
-            z = self.residuals.z
-            density = unknown.log_density(self.evidence, unknown.parts(z), z @ z)
+        classes, densities = self.singles.classes, self.singles.densities
+        each = -np.log(max(len(classes), 1))
+        alone = [Explanation((one,), densities[one.name] + each) for one in classes]
+        if self.unknown is not None:
+            density = self.unknown.log_density(self.evidence, self.residuals.z)
             alone.append(Explanation((NOT_LISTED,), float(density + np.log(self.prior_unknown))))
         return alone
 
     @cached_property
     def sets(self) -> list[Explanation]:
         """Explanations by two or three effects or outlying positions."""
-        k, weighed = len(self.classes), list[Explanation]()
-        if k < 2:
-            return weighed
-        sets = weigh_sets(self.singles.shapes, self.residuals, self.evidence)
-        logs = [one.log_density + set_prior(len(one.best), k) for one in sets]
+        classes, members = self.singles.classes, self.singles.members
+        if len(classes) < 2:
+            return []
+        sets, weighed = weigh_sets(self.singles.shapes, self.residuals, self.evidence), []
+        logs = [log + set_prior(len(shapes), len(classes)) for shapes, log in sets]
         least = max(logs, default=0.0) - RULES.negligible
-        called = {name: one.name for one in self.classes for name in one.members}
+        called = {name: one.name for one in classes for name in one.members}
         strength = self.singles.densities
-        for one, log in zip(sets, logs, strict=True):
-            if log < least:
-                continue
-            best = sorted(one.best, key=lambda h: -strength[h.name])
-            effects = [self.members[h.name] for h in best if h.place is None]
-            if len(set(effects)) == len(effects):
-                named = (Cause(called.get(h.name, h.name), self.members[h.name], h) for h in best)
+        for (shapes, _), log in zip(sets, logs, strict=True):
+            best = sorted(shapes, key=lambda h: -strength[h.name])
+            effects = [members[h.name] for h in best if h.place is None]
+            if log >= least and len(set(effects)) == len(effects):
+                named = (Cause(called.get(h.name, h.name), members[h.name], h) for h in best)
                 weighed.append(Explanation(tuple(named), log))
         return weighed
 
@@ -238,7 +228,7 @@ class Problem:
     def with_unknown(self) -> list[Explanation]:
         """Explanations by something unknown beside the strongest effects and pairs of effects."""
         weighed = list[Explanation]()
-        if len(self.classes) < 2 or self.unknown is None:
+        if len(self.singles.classes) < 2 or self.unknown is None:
             return weighed
         singles = [one for one in self.alone if one.best]
         least = max(one.log_weight for one in (*self.alone, *self.sets)) - RULES.sets_within
@@ -246,20 +236,18 @@ class Problem:
         pairs.sort(key=lambda one: -one.log_weight)
         prior = float(np.log(RULES.prior_two * self.prior_unknown))
         for one in (*singles[: RULES.unknown_beside], *pairs[: RULES.unknown_beside]):
-            basis = column_basis(np.concatenate([h.basis for h in one.best], axis=1))
-            log = unknown_beside(basis, self.unknown, self.residuals, self.evidence)
-            if log is not None:
+            basis = joint_basis(one.best, len(self.residuals.z))
+            unknown, left = self.unknown.orthogonal_to(basis), self.residuals.orthogonal_to(basis)
+            if unknown.places:
+                evidence = Evidence(self.base.level, left.redundancy)
+                nothing = np.logaddexp.reduce(evidence.noise_density(left.z @ left.z))
+                log = float(unknown.log_density(evidence, left.z) - nothing)
                 weighed.append(Explanation((*one.causes, NOT_LISTED), one.log_weight + log + prior))
         return weighed
 
-    def refit(self, chosen: Sequence[Cause]) -> tuple[tuple[Cause, ...], Solution] | None:
+    def refit(self, chosen: Sequence[Cause]) -> Refit | None:
         """Fit with those that mean the same as causes and fit best; None without a solution."""
-        return best_refit(self.frame, self.singles, chosen)
-
-    def cosine(self, name: str, other: str) -> float:
-        """Canonical cosine of the best shapes of two candidates; 0 of what is no candidate."""
-        one, two = (self.singles.best.get(each) for each in (name, other))
-        return 0.0 if one is None or two is None else float(cosines(one.ideal, two.ideal)[0])
+        return best_refit(self.singles, chosen)
 
     # --- noise ------------------------------------------------------------------------------
 
@@ -274,7 +262,7 @@ class Problem:
         by_level = self.detection.noise
         nothing = float(np.logaddexp.reduce(by_level))
         axes, colour = self.noise_evidence
-        tails = most_evidence(tail_test(self.residuals, self.chance).p_value)
+        tails = noise.most_evidence(noise.tail_test(self.residuals, self.chance).p_value)
         logs = {
             COLOUR: nothing + np.log(RULES.prior_coloured) + colour,
             AXES: nothing + np.log(RULES.prior_axes) + axes,
@@ -291,12 +279,80 @@ class Problem:
         """Log evidence that the axes differ in noise, and that the noise is coloured."""
         residuals, evidence = self.residuals, self.evidence
         nothing = float(np.logaddexp.reduce(evidence.noise_density(residuals.z @ residuals.z)))
-        axes = unequal_axes_density(residuals, evidence, self.base.within)
-        return axes - nothing, coloured_density(residuals, evidence) - nothing
+        axes = noise.unequal_axes_density(residuals, evidence, self.base.within)
+        return axes - nothing, noise.coloured_density(residuals, evidence) - nothing
 
     def at(self, frame: SessionFit) -> Problem:
         """The problem that the residuals of another fit pose."""
         return self if frame is self.frame else replace(self, frame=frame)
+
+    def noise_tests(self, campaign: Campaign) -> tuple[NoiseTest, ...]:
+        """All tests of the noise that a campaign allows."""
+        if self.exact:
+            return ()
+        residuals, base = self.residuals, self.base
+        tests = [self._level_test] if base.level.known else []
+        axes, colour = self.noise_evidence
+        tests += [
+            noise.axis_test(residuals, axes),
+            noise.colour_test(residuals, colour),
+            noise.tail_test(residuals, self.chance),
+            # With a sigma far too large, the attitudes would look like steps.
+            noise.resolution_test(campaign.forces, min(base.sigma, base.sigma_posteriori)),
+        ]
+        if campaign.sd is not None and campaign.n_samples is not None:
+            sigma = float(np.mean(residuals.sigmas[:, :3]))
+            tests.append(noise.within_hold_test(residuals, sigma, campaign.sd, campaign.n_samples))
+        return tuple(tests)
+
+    @property
+    def _level_test(self) -> NoiseTest:
+        """Test of the size of the residuals."""
+        return noise.level_test(self.residuals, self.frame.solution.sigma_dof)
+
+    @cached_property
+    def noise_judgement(self) -> NoiseJudgement:
+        """What the residuals say of the noise, which they give where no stated sigma holds."""
+        r, variance = self.residuals.redundancy, self.residuals.variance
+        if not self.base.level.known or self._level_test.p_value < REFUTATION_LEVEL:
+            return NoiseJudgement(trusted=False, variance=variance)
+        pooled = pooled_variance(r * variance, r, self.frame.solution.sigma_dof)
+        return NoiseJudgement(trusted=True, variance=pooled)
+
+    @property
+    def exceeds_stated(self) -> bool:
+        """Whether sigma is given, and the residuals are larger than it allows."""
+        refuted = self.base.level.known and not self.noise_judgement.trusted
+        return refuted and self.residuals.variance > 1
+
+    @property
+    def lack_of_fit(self) -> float:
+        """p-value of the test whether repeats agree better with each other than with the model."""
+        if self.attitude is None:
+            return 1.0
+        repeats = noise.square_of_repeats(self.residuals, self.attitude.vectors)
+        return noise.lack_of_fit(self.residuals, *repeats)
+
+    def misfit(self, solution: Solution) -> Misfit | None:
+        """Return by how much the residuals of a fit exceed the noise; None if they do not.
+
+        The noise is the given sigma. Where none is given, or where repeated positions refute it
+        even after the refit, it is the difference of repeated positions.
+        """
+        stated, r, omega = self.base.level.known, solution.redundancy, solution.omega
+        if stated and 2 * float(special.chdtrc(r, omega)) >= REFUTATION_LEVEL:
+            return None
+        ratio = float(np.sqrt(omega / r))
+        than_stated = Misfit(ratio, of_repeats=False) if stated else None
+        left, labels = Residuals.of(solution), clusters(self.frame.forces)
+        if len(labels) != len(solution.misclosures) or len(np.unique(labels)) == len(labels):
+            return than_stated
+        square, freedom = noise.square_of_repeats(left, space_of_attitudes(left, labels))
+        if not freedom or (stated and special.chdtrc(freedom, square) >= REFUTATION_LEVEL / 2):
+            return than_stated
+        if noise.lack_of_fit(left, square, freedom) >= REFUTATION_LEVEL:
+            return None
+        return than_stated or Misfit(ratio / float(np.sqrt(square / freedom)), of_repeats=True)
 
     # --- whether, and what ------------------------------------------------------------------
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import replace
 from itertools import product
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,6 +18,7 @@ from accelstudy.diagnosis.rules import RULES
 from accelstudy.diagnosis.space.frame import SessionFit
 from accelstudy.diagnosis.space.hypotheses import Hypothesis
 from accelstudy.sensors.models import composition_name
+from accelstudy.sensors.plausibility import impossible_parameters
 from accelstudy.sensors.sensor import SensorModel
 
 EDGE_SHARE = 0.1
@@ -52,17 +54,28 @@ def refit(base: Solution, chosen: Sequence[Hypothesis]) -> Solution | None:
     return solution if solution.redundancy > 0 else None
 
 
-def best_refit(
-    frame: SessionFit, singles: Singles, chosen: Sequence[Cause]
-) -> tuple[tuple[Cause, ...], Solution] | None:
+def impossible(solution: Solution) -> list[str]:
+    """Parameters that are beyond their physical bounds."""
+    sigma = np.sqrt(np.diag(solution.cofactors) * max(1.0, solution.omega / solution.redundancy))
+    u = solution.model.n_parameters
+    return impossible_parameters(solution.model.effects, solution.parameters[:u], sigma[:u])
+
+
+class Refit(NamedTuple):
+    """Causes by the names and shapes that fit best, and the fit with them."""
+
+    causes: tuple[Cause, ...]
+    solution: Solution
+
+
+def best_refit(singles: Singles, chosen: Sequence[Cause]) -> Refit | None:
     """Fit with the members of classes that fit best, by their own names; None without a solution.
 
     To first order the members of a class are the same. Large effects are not of first order.
 
     Parameters
     ----------
-    frame : SessionFit, of the base fit
-    singles : Singles, of the same
+    singles : Singles, of the base fit
     chosen : causes, each with a shape
     """
     alternatives = [
@@ -73,8 +86,8 @@ def best_refit(
         ]
         for one in chosen
     ]
+    frame, base = singles.frame, singles.frame.solution
     sharp = [_sharpen(frame, one) for one in product(*alternatives)]
-    base = frame.solution
     solved = [(one, fit) for one in sharp if (fit := refit(base, one)) is not None]
     if not solved:
         return None
@@ -84,7 +97,7 @@ def best_refit(
     u = len(fit.parameters)
     named = zip(chosen, best, strict=True)
     causes = tuple(Cause(h.name, one.members, h, one.posterior) for one, h in named)
-    return causes, replace(fit, cofactors=with_settings(frame, fit, best)[:u, :u])
+    return Refit(causes, replace(fit, cofactors=with_settings(frame, fit, best)[:u, :u]))
 
 
 STEP = 1e-4

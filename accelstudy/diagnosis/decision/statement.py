@@ -1,4 +1,4 @@
-"""What explanations say as a whole: what is certain, and what is open.
+"""What explanations say as a whole: what is certain, what is open, and the verdict on a problem.
 
 Explanations of near rivals share the posterior, so that each has little of it. Together they may
 leave no doubt that a slow change in time is missing, say, and with it an even nonlinearity, while
@@ -10,16 +10,17 @@ are a credible set of their own, as those of Wang et al. (2020, J. R. Stat. Soc.
 
 from __future__ import annotations
 
-from collections import defaultdict
-from collections.abc import Callable, Collection, Sequence
-from dataclasses import dataclass, replace
-from itertools import combinations, permutations
-from typing import TypeAlias
+from collections.abc import Callable, Collection, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from itertools import combinations, permutations, product
+from typing import Any, NamedTuple, TypeAlias
 
 from accelstudy.campaign.gross_errors.recognition import GROSS_ERRORS
-from accelstudy.diagnosis.decision.posterior import Explanation
+from accelstudy.diagnosis.decision.posterior import Explanation, Posterior
 from accelstudy.diagnosis.evidence.candidates import UNKNOWN, Cause
 from accelstudy.diagnosis.rules import RULES
+from accelstudy.diagnosis.space.frame import SessionFit
+from accelstudy.diagnosis.space.shapes import Place
 from accelstudy.effects import effect_names, get_effect
 from accelstudy.noise_effects import get_noise_effect, noise_effect_names
 
@@ -140,29 +141,25 @@ def _component(
     having: Sequence[tuple[Explanation, int]], cosine: Cosine, probability: float
 ) -> Part | None:
     """What explanations have in common, each at a place; None if that is not certain."""
-    names: dict[str, float] = defaultdict(float)
-    causes: dict[str, Cause] = {}
+    total, causes = 0.0, dict[str, Cause]()
     for one, place in having:
         cause = one.causes[place]
-        names[cause.name] += one.posterior
-        causes[cause.name] = cause
-    total = sum(names.values())
+        known = causes[cause.name].posterior if cause.name in causes else 0.0
+        causes[cause.name] = replace(cause, posterior=known + one.posterior)
+        total += one.posterior
     if round(total, DIGITS) < round(probability, DIGITS):
         return None
-    held: list[str] = []
-    for name in sorted(names, key=lambda name: -round(names[name], DIGITS)):
-        held.append(name)
-        if sum(names[one] for one in held) >= probability:
+    held: list[Cause] = []
+    for cause in sorted(causes.values(), key=lambda cause: -round(cause.posterior, DIGITS)):
+        held.append(cause)
+        if sum(one.posterior for one in held) >= probability:
             break
-    purity = min((cosine(*pair) for pair in combinations(held, 2)), default=None)
+    pairs = combinations([cause.name for cause in held], 2)
+    purity = min((cosine(*pair) for pair in pairs), default=None)
     if purity is not None and purity < RULES.rival:
         return None
-    return Part(
-        family=family_of(*(each for name in held for each in causes[name].members)),
-        names=tuple(replace(causes[name], posterior=names[name]) for name in held),
-        posterior=total,
-        purity=purity,
-    )
+    family = family_of(*(name for cause in held for name in cause.members))
+    return Part(family, tuple(held), total, purity)
 
 
 def _open(
@@ -177,3 +174,64 @@ def _open(
         p = one.posterior + (rest[names].posterior if names in rest else 0.0)
         rest[names] = replace(one, causes=left, posterior=p)
     return tuple(sorted(rest.values(), key=lambda one: -one.posterior)) if any(rest) else ()
+
+
+# --- the verdict --------------------------------------------------------------------------------
+
+
+class Reason(NamedTuple):
+    """Why a verdict is what it is; empty where it needs no reason.
+
+    Attributes
+    ----------
+    code : str
+    facts : mapping, names and numbers of the sentence for it, which `report/words.txt.j2` has
+    """
+
+    code: str = ""
+    facts: Mapping[str, Any] = {}
+
+    @classmethod
+    def of(cls, code: str, **facts: Any) -> Reason:
+        """Reason with its names and numbers."""
+        return cls(code, facts)
+
+
+@dataclass(frozen=True)
+class Finding:
+    """What is said of a problem, with the hypotheses and the fit that it is said by.
+
+    Attributes
+    ----------
+    verdict : str, "no_effect", "named", "narrowed", "learned", "gross_error", "noise_model" or
+        "unknown"
+    frame : SessionFit, of the fit with what was chosen, or of the base fit
+    reason : Reason
+    chosen : tuple of Cause; of the unknown, what is certain
+    posterior : Posterior, empty where nothing is missing
+    statement : Statement, what is missing whatever else is open, and what may be beside that
+    place : Place or None, coordinate and target of a learned function, which is the first chosen
+    """
+
+    verdict: str
+    frame: SessionFit
+    reason: Reason = field(default=Reason())
+    chosen: tuple[Cause, ...] = ()
+    posterior: Posterior = field(default=Posterior())
+    statement: Statement = field(default=Statement())
+    place: Place | None = None
+
+    @property
+    def credible_set(self) -> tuple[Explanation, ...]:
+        """Smallest set of explanations that holds what is missing."""
+        return self.posterior.credible_set
+
+    @property
+    def alternatives(self) -> tuple[Explanation, ...]:
+        """Explanations any of which would be what was chosen."""
+        if self.verdict != "unknown":
+            return self.credible_set
+        added = {cause.members for cause in self.chosen}
+        parts = [part for part in self.statement.certain if part.names[0].members in added]
+        alternatives = product(*(part.names for part in parts))
+        return tuple(Explanation(one, posterior=parts[0].posterior) for one in alternatives)

@@ -2,92 +2,54 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field, replace
-from itertools import product
-from typing import Any, NamedTuple
+from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 
 from accelstudy.adjustment.quality import Solution, global_test
 from accelstudy.basics.levels import REFUTATION_LEVEL
+from accelstudy.campaign.session import Campaign
+from accelstudy.diagnosis.decision.functions import learn_function
 from accelstudy.diagnosis.decision.posterior import NOT_LISTED, Explanation, Posterior
 from accelstudy.diagnosis.decision.problem import Problem, pose
-from accelstudy.diagnosis.decision.statement import Part, Statement, statement_of
+from accelstudy.diagnosis.decision.refits import Refit, impossible
+from accelstudy.diagnosis.decision.statement import Finding, Part, Reason, Statement, statement_of
 from accelstudy.diagnosis.evidence.bounds import within_bounds
 from accelstudy.diagnosis.evidence.candidates import UNKNOWN, Cause
-from accelstudy.diagnosis.evidence.noise_tests import (
-    COLOUR,
-    LEVEL,
-    NOISES,
-    STEPS,
-    NoiseTest,
-    lack_of_fit,
-    misfit,
-)
+from accelstudy.diagnosis.evidence.noise import COLOUR, LEVEL, NOISES, STEPS, NoiseTest, worst_of
 from accelstudy.diagnosis.rules import RULES
 from accelstudy.diagnosis.space.frame import SessionFit
-from accelstudy.diagnosis.space.shapes import Place
 from accelstudy.effects import effect_names, get_effect
-from accelstudy.sensors.plausibility import impossible_parameters
 
 
-class Reason(NamedTuple):
-    """Why a verdict is what it is; empty where it needs no reason.
+def decide(problem: Problem, campaign: Campaign) -> Finding:
+    """Judge the evidence: the first of these rules that matches decides.
 
-    Attributes
-    ----------
-    code : str
-    facts : mapping, names and numbers of the sentence for it, which `report/words.txt.j2` has
+    * Only rounding errors are left: nothing is missing.
+    * The evidence that anything is missing is significant, and one explanation, or a few, are
+      probable enough and leave no misfit: they are named.
+    * It is significant, and yet so weak that a calibration accepts its fit, and nothing is certain:
+      nothing is missing, unless a test of the noise fails.
+    * One coordinate and target have what is missing: its function is learned.
+    * Whatever else is significant is unknown; what is certain of it is added.
+    * A test of the noise fails: the noise is not as it is said to be, or an effect looks like it.
+    * Nothing is missing.
     """
-
-    code: str = ""
-    facts: Mapping[str, Any] = {}
-
-    @classmethod
-    def of(cls, code: str, **facts: Any) -> Reason:
-        """Reason with its names and numbers."""
-        return cls(code, facts)
-
-
-@dataclass(frozen=True)
-class Finding:
-    """What is said of a problem, with the hypotheses and the fit that it is said by.
-
-    Attributes
-    ----------
-    verdict : str, "no_effect", "named", "narrowed", "learned", "gross_error", "noise_model" or
-        "unknown"
-    frame : SessionFit, of the fit with what was chosen, or of the base fit
-    reason : Reason
-    chosen : tuple of Cause; of the unknown, what is certain
-    posterior : Posterior, empty where nothing is missing
-    statement : Statement, what is missing whatever else is open, and what may be beside that
-    place : Place or None, coordinate and target of a learned function, which is the first chosen
-    """
-
-    verdict: str
-    frame: SessionFit
-    reason: Reason = field(default=Reason())
-    chosen: tuple[Cause, ...] = ()
-    posterior: Posterior = field(default=Posterior())
-    statement: Statement = field(default=Statement())
-    place: Place | None = None
-
-    @property
-    def credible_set(self) -> tuple[Explanation, ...]:
-        """Smallest set of explanations that holds what is missing."""
-        return self.posterior.credible_set
-
-    @property
-    def alternatives(self) -> tuple[Explanation, ...]:
-        """Explanations any of which would be what was chosen."""
-        if self.verdict != "unknown":
-            return self.credible_set
-        added = {cause.members for cause in self.chosen}
-        parts = [part for part in self.statement.certain if part.names[0].members in added]
-        alternatives = product(*(part.names for part in parts))
-        return tuple(Explanation(one, posterior=parts[0].posterior) for one in alternatives)
+    if problem.exact:
+        return Finding("no_effect", problem.frame, Reason.of("exact"))
+    nothing = Finding("no_effect", problem.frame)
+    if problem.detection.p_value < RULES.level(problem.evidence.level.known):
+        explained = explain(problem)
+        finding = add_certain_effects(problem, explained)
+        if finding.verdict != "unknown":
+            return finding
+        dismissed = dismiss_weak_evidence(problem, finding)
+        if dismissed is None:
+            return learn_function(problem, explained.posterior, finding) or finding
+        nothing = dismissed
+    worst = worst_of(problem.noise_tests(campaign))
+    return nothing if worst is None else add_certain_effects(problem, judge_noise(problem, worst))
 
 
 # --- something is missing -----------------------------------------------------------------------
@@ -115,7 +77,7 @@ def _judge(problem: Problem, posterior: Posterior) -> Finding:
         reason = _against(problem, top, fit)
         if fit is None or reason.code:
             return Finding("unknown", frame, reason, posterior=posterior)
-        found = [replace(cause, posterior=top.posterior) for cause in fit[0]]
+        found = [replace(cause, posterior=top.posterior) for cause in fit.causes]
         found.sort(key=lambda one: one.shape.place is None)
         credible, verdict = posterior.credible_set, ""
         of_effects = sum(one.posterior for one in credible if one.is_effects)
@@ -127,7 +89,7 @@ def _judge(problem: Problem, posterior: Posterior) -> Finding:
         elif (sure or len(credible) <= RULES.many) and of_effects >= RULES.sure:
             verdict = "narrowed"
         if verdict:
-            return Finding(verdict, SessionFit.of(fit[1]), Reason(), tuple(found), posterior)
+            return Finding(verdict, SessionFit.of(fit.solution), Reason(), tuple(found), posterior)
     if top.is_noise and top.posterior >= RULES.sure:
         reason = Reason.of("noise", name=top.names[0], remark=NOISES[top.names[0]])
         return Finding("noise_model", frame, reason, posterior=posterior)
@@ -135,24 +97,15 @@ def _judge(problem: Problem, posterior: Posterior) -> Finding:
     return Finding("unknown", frame, reason, posterior=posterior)
 
 
-def _against(
-    problem: Problem, top: Explanation, fit: tuple[tuple[Cause, ...], Solution] | None
-) -> Reason:
+def _against(problem: Problem, top: Explanation, fit: Refit | None) -> Reason:
     """Why an explanation cannot be the answer, however probable; empty if it can."""
     if fit is None:
         return Reason.of("no solution", names=top.names)
-    if left := misfit(problem, fit[1]):
+    if left := problem.misfit(fit.solution):
         return Reason.of("misfit", names=top.names, left=left)
-    if beyond := impossible(fit[1]):
+    if beyond := impossible(fit.solution):
         return Reason.of("impossible", names=top.names, beyond=beyond)
     return Reason()
-
-
-def impossible(solution: Solution) -> list[str]:
-    """Parameters that are beyond their physical bounds."""
-    sigma = np.sqrt(np.diag(solution.cofactors) * max(1.0, solution.omega / solution.redundancy))
-    u = solution.model.n_parameters
-    return impossible_parameters(solution.model.effects, solution.parameters[:u], sigma[:u])
 
 
 def dismiss_weak_evidence(problem: Problem, finding: Finding) -> Finding | None:
@@ -221,13 +174,13 @@ def _pairs_with(problem: Problem, alone: Explanation, solution: Solution) -> lis
     """One effect with another one, or with something unknown, in what its refit leaves."""
     inner, weighed = pose(replace(problem.base, solution=solution)), list[Explanation]()
     z = inner.residuals.z
-    odds = inner.field.odds(inner.evidence, inner.field.project(z)) + alone.log_weight
+    odds = inner.field.odds(inner.evidence, z) + alone.log_weight
     for name, log in zip(inner.field.names, odds.tolist(), strict=True):
         cause, more = NOT_LISTED, np.log(inner.prior_unknown)
         if name != UNKNOWN:
             other = inner.frame.candidates[name].strongest(z)
-            cause = Cause(name, inner.members[name], other)
-            more = within_bounds(other, z, inner.evidence) - np.log(len(problem.classes))
+            cause = Cause(name, inner.singles.members[name], other)
+            more = within_bounds(other, z, inner.evidence) - np.log(len(problem.singles.classes))
         weight = log + float(more + np.log(RULES.prior_two))
         weighed.append(Explanation((*alone.causes, cause), weight))
     return weighed
@@ -243,13 +196,13 @@ def _pairs_with(problem: Problem, alone: Explanation, solution: Solution) -> lis
 
 def add_certain_effects(problem: Problem, finding: Finding) -> Finding:
     """Say what is certain, and add it to the fit whatever else is missing."""
-    posterior = finding.posterior
+    posterior, cosine = finding.posterior, problem.singles.cosine
     if finding.verdict != "unknown":
-        return replace(finding, statement=statement_of(finding.credible_set, problem.cosine))
+        return replace(finding, statement=statement_of(finding.credible_set, cosine))
     beyond = sum(one.posterior for one in posterior.all if UNKNOWN in one.names)
     if finding.reason.code == "misfit" or beyond > 1 - RULES.credible:
         posterior = posterior.doubting(_perhaps_imitations(problem, posterior))
-    says = statement_of(posterior.all, problem.cosine)
+    says = statement_of(posterior.all, cosine)
     finding = replace(finding, posterior=posterior, statement=says)
     chosen = [cause for _, cause in _certain_effects(problem, posterior, says)]
     if not chosen:
@@ -257,7 +210,7 @@ def add_certain_effects(problem: Problem, finding: Finding) -> Finding:
     fit = problem.refit(chosen)
     if fit is None:
         return replace(finding, statement=Statement())
-    return replace(finding, frame=SessionFit.of(fit[1]), chosen=fit[0])
+    return replace(finding, frame=SessionFit.of(fit.solution), chosen=fit.causes)
 
 
 def _certain_effects(
@@ -279,7 +232,8 @@ def _perhaps_imitations(problem: Problem, posterior: Posterior) -> set[str]:
     More is missing than the catalogue explains. An effect of it may imitate what is in none, though
     hardly ever nearly all of that.
     """
-    seeming = _certain_effects(problem, posterior, statement_of(posterior.all, problem.cosine))
+    says = statement_of(posterior.all, problem.singles.cosine)
+    seeming = _certain_effects(problem, posterior, says)
     chosen, names = [cause for _, cause in seeming], set[str]()
     after = _disagreement(problem, chosen)
     for i, (part, _) in enumerate(seeming):
@@ -291,11 +245,11 @@ def _perhaps_imitations(problem: Problem, posterior: Posterior) -> set[str]:
 
 def _disagreement(problem: Problem, chosen: Sequence[Cause]) -> float:
     """Ω that a fit leaves beyond the given noise, all if none is given; ∞ without a solution."""
-    fit = problem.refit(chosen) if chosen else ((), problem.frame.solution)
+    fit = problem.refit(chosen) if chosen else Refit((), problem.frame.solution)
     if fit is None:
         return np.inf
-    noise = fit[1].redundancy * float(problem.evidence.level.known)
-    return max(fit[1].omega - noise, 1e-9)
+    noise = fit.solution.redundancy * float(problem.evidence.level.known)
+    return max(fit.solution.omega - noise, 1e-9)
 
 
 # --- a test of the noise fails, though no effect was significant --------------------------------
@@ -306,7 +260,7 @@ def judge_noise(problem: Problem, worst: NoiseTest) -> Finding:
     posterior = problem.posterior
     verdict, name, noise = "noise_model", worst.name, posterior.p_noise
     reason = Reason.of("noise", name=name, remark=worst.remark)
-    if lack_of_fit(problem) < REFUTATION_LEVEL and name != STEPS:
+    if problem.lack_of_fit < REFUTATION_LEVEL and name != STEPS:
         verdict, reason = "unknown", Reason.of("lack of fit")
     # Larger residuals may be an effect that the test for a pattern could not see.
     elif name == LEVEL and worst.values[0] >= 1 and noise < RULES.more_probable:
@@ -351,9 +305,8 @@ def reason_of_unrecorded(problem: Problem, finding: Finding) -> Reason | None:
 def _p_courses(problem: Problem, posterior: Posterior) -> float:
     """Probability of effects of time or temperature, and of something unknown like them."""
     courses = {name for name in effect_names() if get_effect(name).is_course}
-    unknown = problem.unknown
-    if unknown is not None:
-        places = unknown.place_densities(problem.evidence, problem.residuals.z)
+    if problem.unknown is not None:
+        places = problem.unknown.place_densities(problem.evidence, problem.residuals.z)
         if max(places, key=places.__getitem__)[0] in ("time", "temperature"):
             courses.add(UNKNOWN)
     return sum(one.posterior for one in posterior.reported if courses.issuperset(one.names))

@@ -3,34 +3,29 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import cached_property
-from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from accelstudy.diagnosis.evidence.bounds import within_bounds
-from accelstudy.diagnosis.evidence.size import Evidence
+from accelstudy.diagnosis.evidence.size import Evidence, log_mean
 from accelstudy.diagnosis.rules import RULES
 from accelstudy.diagnosis.space.frame import SessionFit
-from accelstudy.diagnosis.space.hypotheses import OUTLIER, Hypotheses, Hypothesis, Spaces, log_sum
-from accelstudy.diagnosis.space.residuals import Residuals
+from accelstudy.diagnosis.space.hypotheses import (
+    OUTLIER,
+    Hypotheses,
+    Hypothesis,
+    Spaces,
+    cosines,
+)
 from accelstudy.diagnosis.space.shapes import LearnedShapes
 
 Array = NDArray[np.float64]
-Ints = NDArray[np.int_]
 
 UNKNOWN = "unknown"
 """Something of one of the learned shapes, or of the attitude alone, that is none of the effects."""
-
-
-class Projection(NamedTuple):
-    """What densities need of residuals: parts in all named and unknown shapes, and ‖z‖²."""
-
-    parts: Array
-    of_unknown: Array
-    squares: Array
 
 
 @dataclass(frozen=True)
@@ -52,7 +47,12 @@ class Field:
         return (*self.candidates, *([] if self.unknown is None else [UNKNOWN]))
 
     @cached_property
-    def starts(self) -> Ints:
+    def shapes(self) -> list[Hypothesis]:
+        """All shapes with names, (s,)."""
+        return [one for shapes in self.candidates.values() for one in shapes.hypotheses]
+
+    @cached_property
+    def starts(self) -> NDArray[np.int_]:
         """First shape of each named candidate among all, and their number, (K + 1,)."""
         return np.cumsum([0, *(len(one) for one in self.candidates.values())])
 
@@ -62,31 +62,26 @@ class Field:
         each = [*self.candidates.values()]
         return Spaces(
             np.concatenate([one.prior for one in each]) / len(each),
-            tuple(share for one in each for share in one.shares),
+            np.concatenate([one.dims for one in each]),
             np.concatenate([one.vectors for one in each], axis=1),
         )
 
-    def project(self, errors: Array) -> Projection:
-        """What the densities need of residuals (..., m)."""
-        beyond = errors[..., :0] if self.unknown is None else self.unknown.parts(errors)
-        return Projection(self.spaces.parts(errors), beyond, np.sum(errors**2, axis=-1))
-
-    def densities(self, evidence: Evidence, seen: Projection) -> Array:
-        """Log density of residuals under each candidate, over its shapes, (..., K)."""
+    def densities(self, evidence: Evidence, errors: Array) -> Array:
+        """Log density of residuals (..., m) under each candidate, over its shapes, (..., K)."""
         starts, prior = self.starts, self.spaces.prior * len(self.candidates)
-        logs = self.spaces.logs(evidence, seen.parts, seen.squares) + np.log(prior)
+        logs = self.spaces.logs(evidence, errors) + np.log(prior)
         top = np.maximum.reduceat(logs, starts[:-1], axis=-1)
         logs -= np.repeat(top, np.diff(starts), axis=-1)
         each = top + np.log(np.add.reduceat(np.exp(logs), starts[:-1], axis=-1))
         if self.unknown is None:
             return np.asarray(each)
-        unknown = self.unknown.log_density(evidence, seen.of_unknown, seen.squares)
-        return np.append(each, unknown[..., None], axis=-1)
+        return np.append(each, self.unknown.log_density(evidence, errors)[..., None], axis=-1)
 
-    def odds(self, evidence: Evidence, seen: Projection) -> Array:
+    def odds(self, evidence: Evidence, errors: Array) -> Array:
         """Log odds of each candidate against nothing, (..., K)."""
-        nothing = np.logaddexp.reduce(evidence.noise_density(seen.squares), axis=-1)
-        return np.asarray(self.densities(evidence, seen) - nothing[..., None])
+        noise = evidence.noise_density(np.sum(errors**2, axis=-1))
+        nothing = np.logaddexp.reduce(noise, axis=-1)
+        return np.asarray(self.densities(evidence, errors) - nothing[..., None])
 
 
 # --- which shapes explain most, and which names mean the same ------------------------------------
@@ -122,16 +117,57 @@ class Singles:
 
     Attributes
     ----------
+    frame : SessionFit, whose candidates they are
     shapes : dict of candidate to shapes, closer together about the best one where it matters
     logs : dict of candidate to the log densities of the residuals under its shapes, (s,)
-    densities : dict of candidate to the log density over its shapes
     best : dict of candidate to the shape that explains most
     """
 
+    frame: SessionFit
     shapes: Mapping[str, Hypotheses]
     logs: Mapping[str, Array]
-    densities: Mapping[str, float]
     best: Mapping[str, Hypothesis]
+
+    @cached_property
+    def densities(self) -> dict[str, float]:
+        """Log density of the residuals under each candidate, over its shapes."""
+        each = self.shapes.items()
+        return {name: float(log_mean(self.logs[name], one.prior)) for name, one in each}
+
+    @cached_property
+    def members(self) -> dict[str, tuple[str, ...]]:
+        """Names that mean the same as each candidate in this campaign, itself included.
+
+        They do if any shapes are the same between which the residuals do not decide.
+        """
+        members: dict[str, tuple[str, ...]] = {OUTLIER: (OUTLIER,)}
+        for name, logs in self.logs.items():
+            if name != OUTLIER:
+                undecided = np.flatnonzero(logs > logs.max() - RULES.undecided).tolist()
+                probable = [self.shapes[name][i] for i in undecided]
+                members[name] = tuple(sorted({*self.frame.indistinguishable(probable), name}))
+        return members
+
+    @cached_property
+    def classes(self) -> list[Cause]:
+        """Candidates with those that mean the same, strongest evidence first."""
+        densities = self.densities
+        left = sorted(densities, key=lambda name: -densities[name])
+        classes = []
+        while left:
+            same = self.members[left[0]]
+            alike = [name for name in left if name in same]
+            # Rounding errors must not choose among equally good names: the first one is taken.
+            least = densities[left[0]] - RULES.same_evidence
+            name = min(name for name in alike if densities[name] >= least)
+            classes.append(Cause(name, same, self.best[name]))
+            left = [name for name in left if name not in alike]
+        return classes
+
+    def cosine(self, name: str, other: str) -> float:
+        """Canonical cosine of the best shapes of two candidates; 0 of what is no candidate."""
+        one, two = self.best.get(name), self.best.get(other)
+        return 0.0 if one is None or two is None else float(cosines(one.ideal, two.ideal)[0])
 
 
 def weigh_singles(frame: SessionFit, evidence: Evidence) -> Singles:
@@ -139,55 +175,19 @@ def weigh_singles(frame: SessionFit, evidence: Evidence) -> Singles:
     z, first = frame.residuals.z, dict[str, float]()
     if frame.candidates:
         field = Field(frame.candidates)
-        densities = field.densities(evidence, field.project(z))
-        first = dict(zip(field.names, densities.tolist(), strict=True))
+        first = dict(zip(field.names, field.densities(evidence, z).tolist(), strict=True))
     least = max(first.values(), default=0.0) - RULES.refined_within
     shapes, logs, best = dict[str, Hypotheses](), dict[str, Array](), dict[str, Hypothesis]()
     for name, tried in frame.candidates.items():
         worth = first[name] > least
         own = refine(frame, tried) if worth else tried
-        parts = own.parts(z)
-        shapes[name], logs[name] = own, own.logs(evidence, parts, z @ z)
+        parts, logs[name], shapes[name] = own.parts(z), own.logs(evidence, z), own
         if worth and own[0].estimates is not None:
             within = np.array([within_bounds(one, z, evidence) for one in own.hypotheses])
             logs[name] = logs[name] + within
             parts = parts + 2 * within
         best[name] = own[int(np.argmax(parts))]
-    total = {name: float(log_sum(log + np.log(shapes[name].prior))) for name, log in logs.items()}
-    return Singles(shapes, logs, total, best)
-
-
-def equivalents(frame: SessionFit, singles: Singles) -> dict[str, tuple[str, ...]]:
-    """Names that mean the same as each candidate in this campaign, itself included.
-
-    They do if any shapes are the same between which the residuals do not decide.
-    """
-    members: dict[str, tuple[str, ...]] = {}
-    for name, shapes in singles.shapes.items():
-        if name == OUTLIER:
-            members[name] = (name,)
-            continue
-        logs = singles.logs[name]
-        probable = [shapes[int(i)] for i in np.flatnonzero(logs > logs.max() - RULES.undecided)]
-        members[name] = tuple(sorted({*frame.indistinguishable(probable), name}))
-    return members
-
-
-def classes_of(singles: Singles, members: Mapping[str, tuple[str, ...]]) -> list[Cause]:
-    """Candidates with those that mean the same, strongest evidence first."""
-    densities = singles.densities
-    left = sorted(densities, key=lambda name: -densities[name])
-    classes = []
-    while left:
-        name = left.pop(0)
-        same = members[name]
-        alike = [other for other in left if other in same]
-        left = [other for other in left if other not in same]
-        # Rounding errors must not choose among equally good names: the first one is taken.
-        least = densities[name] - RULES.same_evidence
-        name = min(other for other in (name, *alike) if densities[other] >= least)
-        classes.append(Cause(name, same, singles.best[name]))
-    return classes
+    return Singles(frame, shapes, logs, best)
 
 
 def refine(frame: SessionFit, shapes: Hypotheses) -> Hypotheses:
@@ -244,26 +244,3 @@ def _complete(frame: SessionFit, shapes: Hypotheses) -> Hypotheses:
         if len(fine) == len(shapes):
             return shapes
         shapes = Hypotheses.of(fine)
-
-
-def unknown_beside(
-    basis: Array, unknown: LearnedShapes, residuals: Residuals, evidence: Evidence
-) -> float | None:
-    """Log evidence of something unknown beside a space, against the space alone.
-
-    None where no shape has anything of its own beside it.
-
-    Parameters
-    ----------
-    basis : (m, l) array, of the space
-    unknown : LearnedShapes
-    residuals : Residuals
-    evidence : Evidence
-    """
-    rest, left = unknown.orthogonal_to(basis), residuals.orthogonal_to(basis)
-    if not rest.places:
-        return None
-    evidence = replace(evidence, redundancy=left.redundancy)
-    squares = left.z @ left.z
-    density = rest.log_density(evidence, rest.parts(left.z), squares)
-    return float(density - np.logaddexp.reduce(evidence.noise_density(squares)))

@@ -21,7 +21,7 @@ from numpy.typing import NDArray
 from accelstudy.diagnosis.evidence.candidates import Field
 from accelstudy.diagnosis.evidence.size import Evidence, log_mean
 from accelstudy.diagnosis.rules import RULES
-from accelstudy.diagnosis.space.hypotheses import Spaces, log_sum
+from accelstudy.diagnosis.space.hypotheses import Spaces
 from accelstudy.diagnosis.space.residuals import Residuals
 
 Array = NDArray[np.float64]
@@ -91,11 +91,10 @@ class Detection:
 
 def detect(field: Field, evidence: Evidence, residuals: Residuals, chance: Chance) -> Detection:
     """Test whether anything is missing."""
+    noise = evidence.noise_density(residuals.z @ residuals.z)
     if not field.candidates:
-        noise = evidence.noise_density(residuals.z @ residuals.z)
         return Detection(1.0, {}, noise)
-    seen = field.project(residuals.z)
-    densities, noise = field.densities(evidence, seen), evidence.noise_density(seen.squares)
+    densities = field.densities(evidence, residuals.z)
     observed = densities - np.logaddexp.reduce(noise)
     null = null_distribution(field, evidence, residuals, chance)
     return Detection(
@@ -109,8 +108,8 @@ def null_distribution(
     field: Field, evidence: Evidence, residuals: Residuals, chance: Chance
 ) -> tuple[Array, Array]:
     """S of simulated residuals, (b,), and their weights as noise alone."""
-    drawn = field.project(chance.errors_with_effects(residuals, field.spaces))
-    ratio = np.exp(np.minimum(log_ratio(field.spaces, drawn.parts), 700.0))
+    drawn = chance.errors_with_effects(residuals, field.spaces)
+    ratio = np.exp(np.minimum(log_ratio(field.spaces, drawn), 700.0))
     return log_mean(field.odds(evidence, drawn)), 1 / (0.5 + 0.5 * ratio)
 
 
@@ -132,20 +131,18 @@ def draw_effects(spaces: Spaces, count: int, rng: np.random.Generator) -> Array:
     sizes = rng.choice(PROPOSED, size=count)
     dims = spaces.dims[places]
     sigmas = np.sqrt(np.repeat(sizes / dims, dims))
-    return spaces.combine(places, rng.standard_normal(dims.sum()) * sigmas)
+    rows = np.repeat(np.arange(count), dims)
+    first = np.repeat(spaces.ends[places] - (np.cumsum(dims) - dims), dims)
+    columns = np.zeros((count, spaces.vectors.shape[1]))
+    columns[rows, first + np.arange(len(rows))] = rng.standard_normal(dims.sum()) * sigmas
+    return np.asarray(columns @ spaces.vectors.T)
 
 
-def log_ratio(spaces: Spaces, parts: Array) -> Array:
-    """Log ratio of the densities of residuals with such an effect and of noise alone, (b,).
-
-    Parameters
-    ----------
-    spaces : Spaces
-    parts : (b, s) array, of residuals
-    """
-    logs = []
+def log_ratio(spaces: Spaces, errors: Array) -> Array:
+    """Log ratio of the densities of residuals (b, m) with such an effect and without, (b,)."""
+    parts, logs = spaces.parts(errors), []
     for size in PROPOSED.tolist():
         g = size / spaces.dims
         taken, growth = parts * (g / (1 + g)), spaces.dims * np.log1p(g)
-        logs.append(log_sum((taken - growth) / 2 + np.log(spaces.prior)))
+        logs.append(log_mean((taken - growth) / 2, spaces.prior))
     return log_mean(np.stack(logs, axis=-1))

@@ -20,17 +20,17 @@ Stat. Soc. B 82, 1273), costs far less and finds less where signatures are corre
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from typing import TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.special import gammaln
 
-from accelstudy.adjustment.quality import column_basis
 from accelstudy.diagnosis.evidence.bounds import within_bounds
+from accelstudy.diagnosis.evidence.candidates import Field
 from accelstudy.diagnosis.evidence.size import Evidence
 from accelstudy.diagnosis.rules import RULES
-from accelstudy.diagnosis.space.hypotheses import OUTLIER, Hypotheses, Hypothesis
+from accelstudy.diagnosis.space.hypotheses import OUTLIER, Hypotheses, Hypothesis, joint_basis
 from accelstudy.diagnosis.space.residuals import Residuals
 
 Array = NDArray[np.float64]
@@ -38,12 +38,8 @@ Places = tuple[int, ...]
 """Numbers of candidates, ascending; that of the outlying positions may be there twice."""
 
 
-@dataclass(frozen=True)
-class EffectSet:
-    """Candidates in their best shapes, and the log density of the residuals with all of them."""
-
-    best: tuple[Hypothesis, ...]
-    log_density: float
+EffectSet: TypeAlias = tuple[tuple[Hypothesis, ...], float]
+"""Candidates in their best shapes, and the log density of the residuals with all of them."""
 
 
 def set_prior(size: int, count: int) -> float:
@@ -56,10 +52,7 @@ def set_prior(size: int, count: int) -> float:
 
 
 def weigh_sets(
-    candidates: Mapping[str, Hypotheses],
-    residuals: Residuals,
-    evidence: Evidence,
-    most: int = RULES.set_members,
+    candidates: Mapping[str, Hypotheses], residuals: Residuals, evidence: Evidence
 ) -> list[EffectSet]:
     """Evidence for the sets of two and more candidates that explain residuals best.
 
@@ -68,20 +61,15 @@ def weigh_sets(
     candidates : mapping of name to shapes
     residuals : Residuals
     evidence : Evidence
-    most : int, members of a set; of two every pair is weighed
     """
-    shown = {name: shapes for name, shapes in candidates.items() if len(shapes)}
-    if not shown:
+    if not candidates:
         return []
-    search = _Search(shown, residuals, evidence)
+    search = _Search(candidates, residuals, evidence)
     search.extend(())
     singles = sorted(search.weights, key=search.weights.__getitem__, reverse=True)
-    for one in singles if most == 2 else singles[: RULES.sets_started]:
+    for one in singles[: RULES.sets_started]:
         search.extend(one)
-    while most > 2 and len(search.extended) < RULES.sets_extended:
-        further = search.next(most)
-        if further is None:
-            break
+    while len(search.extended) < RULES.sets_extended and (further := search.next()) is not None:
         search.extend(further)
     return search.sets()
 
@@ -101,29 +89,21 @@ class _Search:
     ) -> None:
         self.z, self.evidence = residuals.z, evidence
         self.square = float(self.z @ self.z)
-        count, sizes = len(candidates), range(1, RULES.set_members + 1)
-        self.priors = {size: set_prior(size, count) for size in sizes}
-        self.shapes: list[Hypothesis] = []
-        self.factors: list[float] = []
-        priors: list[Array] = []
-        for shapes in candidates.values():
-            self.shapes += shapes.hypotheses
-            self.factors += [within_bounds(one, self.z, evidence) for one in shapes.hypotheses]
-            priors.append(np.log(shapes.prior))
-        self.shape_priors = np.concatenate(priors) + self.factors
-        self.counts = [len(each) for each in priors]
-        self.owners = np.repeat(np.arange(len(self.counts)), self.counts)
-        self.firsts = np.cumsum([0, *self.counts[:-1]])
+        field, count = Field(candidates), len(candidates)
+        self.priors = {size: set_prior(size, count) for size in range(1, RULES.set_members + 1)}
+        self.shapes, spaces = field.shapes, field.spaces
+        self.factors = np.array([within_bounds(one, self.z, evidence) for one in self.shapes])
+        self.shape_priors = np.log(spaces.prior * count) + self.factors
+        self.firsts, self.counts = field.starts[:-1], np.diff(field.starts)
+        self.owners = np.repeat(np.arange(count), self.counts)
         self.outliers = list(candidates).index(OUTLIER) if OUTLIER in candidates else -1
-        self.dims = np.array([shape.dim for shape in self.shapes], dtype=int)
-        self.starts = np.cumsum(self.dims) - self.dims
+        self.dims, self.starts = spaces.dims, spaces.ends[:-1]
         # Shapes of one dimension are projected together.
         self.alike = [
             (some := np.flatnonzero(self.dims == dim), self.starts[some][:, None] + np.arange(dim))
             for dim in np.unique(self.dims)
         ]
-        bases = np.concatenate([shape.basis for shape in self.shapes], axis=1)
-        self.gram, self.seen = bases.T @ bases, self.z @ bases
+        self.gram, self.seen = spaces.vectors.T @ spaces.vectors, self.z @ spaces.vectors
         nothing = float(np.logaddexp.reduce(evidence.noise_density(self.square)))
         self.found: dict[Places, tuple[float, tuple[int, ...]]] = {(): (nothing, ())}
         self.weights: dict[Places, float] = {}
@@ -144,14 +124,14 @@ class _Search:
                 self.found[more] = log, (*chosen, best)
                 self.weights[more] = log + self.priors[len(more)]
 
-    def next(self, most: int) -> Places | None:
+    def next(self) -> Places | None:
         """Strongest set that was not extended yet, or such a set without one of its members."""
         least = max(self.weights.values(), default=0.0) - RULES.sets_within
         strong = [places for places, weight in self.weights.items() if weight > least]
         for places in sorted(strong, key=self.weights.__getitem__, reverse=True):
             without = [(*places[:i], *places[i + 1 :]) for i in range(len(places))]
             for one in (places, *without):
-                if len(one) < most and one in self.found and one not in self.extended:
+                if len(one) < RULES.set_members and one in self.found and one not in self.extended:
                     return one
         return None
 
@@ -165,10 +145,9 @@ class _Search:
             best = tuple(self.shapes[i] for i in chosen)
             for one, i in zip(best, chosen, strict=True):
                 if self.weights[places] > least and one.estimates is not None:
-                    others = [other.basis for other in best if other is not one]
-                    beside = column_basis(np.concatenate(others, axis=1))
+                    beside = joint_basis([o for o in best if o is not one], len(self.z))
                     log += within_bounds(one, self.z, self.evidence, beside) - self.factors[i]
-            sets.append(EffectSet(best, log))
+            sets.append((best, float(log)))
         return sets
 
     def _with_each_further(self, chosen: tuple[int, ...]) -> tuple[float, Array]:

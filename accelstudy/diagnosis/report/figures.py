@@ -12,13 +12,14 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
 from numpy.typing import NDArray
 
+from accelstudy.adjustment.quality import Solution
 from accelstudy.basics.units import shown_unit, to_display
 from accelstudy.basics.wording import probability, words
+from accelstudy.diagnosis.decision.functions import LearnedShape
 from accelstudy.diagnosis.decision.posterior import Explanation
 from accelstudy.diagnosis.evidence.candidates import UNKNOWN
-from accelstudy.diagnosis.report.document import condition_sigma
+from accelstudy.diagnosis.report.words import TARGETS, coordinate_of
 from accelstudy.diagnosis.result import CampaignDiagnosis
-from accelstudy.diagnosis.shape import TARGETS, LearnedShape, coordinate_of
 from accelstudy.diagnosis.space.shapes import coordinate_in_holds
 from accelstudy.drawing.style import (
     ANGLE_COLOURS,
@@ -40,7 +41,7 @@ def diagnosis_figures(
     Parameters
     ----------
     diagnosis : CampaignDiagnosis
-    positions : DataFrame, of `positions_table`
+    positions : DataFrame, of `Diagnosis.positions`
     """
     d = diagnosis
     figures: dict[str, Callable[[], Figure]] = {"residuals": lambda: residual_figure(d, positions)}
@@ -75,7 +76,7 @@ def residual_figure(diagnosis: CampaignDiagnosis, positions: pd.DataFrame) -> Fi
     # Labels of narrow panels must not meet.
     ticks = 3 if len(panels) > 2 else 5
     # Residuals that exceed the stated noise must look too large.
-    sigma = condition_sigma(d.base, 1.0 if d.sigma_known else d.gap.after or d.gap.before)
+    sigma = _condition_sigma(d.base, 1.0 if d.sigma_known else d.gap.after or d.gap.before)
     for when, line in zip(rows, grid, strict=True):
         for (label, abscissa), ax in zip(panels.items(), line, strict=True):
             ax.axhspan(-2e3 * sigma, 2e3 * sigma, color=NOISE)
@@ -89,6 +90,12 @@ def residual_figure(diagnosis: CampaignDiagnosis, positions: pd.DataFrame) -> Fi
     return figure
 
 
+def _condition_sigma(solution: Solution, variance: float) -> float:
+    """Noise of a residual, m/s²: rms over positions and conditions, without that of parameters."""
+    covariance = solution.whitening @ np.swapaxes(solution.whitening, 1, 2)
+    return float(np.sqrt(variance * np.mean(np.einsum("ncc->nc", covariance))))
+
+
 def _components(positions: pd.DataFrame) -> list[str]:
     """Names of the components of a residual."""
     return [name for name in AXES if f"residual_{name}_before_mps2" in positions]
@@ -96,30 +103,29 @@ def _components(positions: pd.DataFrame) -> list[str]:
 
 def _panels(diagnosis: CampaignDiagnosis, positions: pd.DataFrame, count: int) -> dict[str, Array]:
     """Abscissas (n, count) of the components in each panel, by its label."""
-    unit = diagnosis.frame.forces / diagnosis.frame.solution.gravity
+    frame = diagnosis.frame
+    unit = frame.forces / frame.solution.gravity
     panels = {"$f/g$ of the same axis": unit}
     if count == 1:
         panels = {f"$f_{axis}/g$": unit[:, [k]] for k, axis in enumerate("xyz")}
-    for column, label, scale in (
-        ("time_s", "time / min", 60),
-        ("temperature_degC", "temperature / °C", 1),
-    ):
-        values = positions[column].to_numpy() / scale
-        if np.isfinite(values).all() and np.ptp(values) > 0:
-            panels[label] = _abreast(np.repeat(values[:, None], count, axis=1))
+    recorded = {"time": positions["time_s"], "temperature": positions["temperature_degC"]}
+    varying = {name: one for name, one in recorded.items() if one.notna().all() and np.ptp(one) > 0}
+    columns = {name: one.to_numpy()[:, None] for name, one in varying.items()}
     # What is missing shows over the coordinate that has it.
     coordinate = diagnosis.like[0].coordinate if diagnosis.like else "force"
     # Without times that of the time is the order.
-    shown = "order" if coordinate == "time" and diagnosis.frame.hold.time is None else coordinate
-    if shown in ("force", "time", "temperature"):
-        return panels
-    of, values = coordinate_of(shown), coordinate_in_holds(coordinate, diagnosis.frame)
-    words, values = _axis(of.place), values / of.size
-    if values.shape[1] == count:
-        return panels | {_per_unit(words, of.unit): _abreast(values)}
-    parts = {1: [words], 2: ["roll", "pitch"], 3: [f"{words}, {axis}" for axis in "xyz"]}
-    for part, x in zip(parts[values.shape[1]], values.T, strict=True):
-        panels[_per_unit(part, of.unit)] = _abreast(np.repeat(x[:, None], count, axis=1))
+    shown = "order" if coordinate == "time" and frame.hold.time is None else coordinate
+    if shown not in ("force", *recorded):
+        columns[shown] = coordinate_in_holds(coordinate, frame)
+    for name, values in columns.items():
+        of = coordinate_of(name)
+        words, arguments = _axis(of.place), values.shape[1]
+        if arguments == count:  # each component has its own
+            panels[_per_unit(words, of.unit)] = _abreast(values / of.size)
+            continue
+        parts = {1: [words], 2: ["roll", "pitch"], 3: [f"{words}, {axis}" for axis in "xyz"]}
+        for part, x in zip(parts[arguments], values.T / of.size, strict=True):
+            panels[_per_unit(part, of.unit)] = _abreast(np.repeat(x[:, None], count, axis=1))
     return panels
 
 
@@ -195,15 +201,15 @@ def shape_figure(shape: LearnedShape) -> Figure:
     """Draw a learned function with its band over its coordinate."""
     figure = new_figure(COLUMN, 10 + 36 * len(shape.components))
     panels = figure.subplots(len(shape.components), 1, sharex=True, sharey=True)
-    of, target = coordinate_of(shape.effect.coordinate), TARGETS[shape.effect.target]
-    unit, grid = shown_unit(target.unit), shape.grid / of.size
+    of, (label, *_) = coordinate_of(shape.effect.coordinate), TARGETS[shape.effect.target]
+    unit, grid = shown_unit(shape.unit), shape.grid / of.size
     for i, (name, ax) in enumerate(zip(shape.components, panels, strict=True)):
         colour = COMPONENTS[name]
-        h, sigma = (to_display(v[:, i], target.unit) for v in (shape.values, shape.sigmas))
+        h, sigma = (to_display(v[:, i], shape.unit) for v in (shape.values, shape.sigmas))
         ax.axhline(0, color=INK, linewidth=0.6)
         ax.fill_between(grid, h - BAND * sigma, h + BAND * sigma, color=colour, alpha=0.25, lw=0)
         ax.plot(grid, h, color=colour)
-        ax.set_ylabel(f"{target.label.format(name)}\n{_per_unit('h', unit)}")
+        ax.set_ylabel(f"{label.format(name)}\n{_per_unit('h', unit)}")
         ax.yaxis.set_major_locator(MaxNLocator(5, steps=[1, 2, 5, 10]))
         if name not in shape.axes:
             ax.set_title("no part of it shows", loc="right")

@@ -7,24 +7,32 @@ from __future__ import annotations
 
 import sys
 from collections.abc import Mapping, Sequence
+from typing import NamedTuple
 
 from accelstudy.basics.levels import ACCEPTED, UNCHECKED
-from accelstudy.basics.units import GON, shown_unit
-from accelstudy.basics.wording import amount, comma_list, probability, words, words_with_counts
+from accelstudy.basics.units import GON, attitude_unit, shown_unit, to_attitude
+from accelstudy.basics.wording import (
+    amount,
+    comma_list,
+    number,
+    probability,
+    words,
+    words_with_counts,
+)
+from accelstudy.diagnosis.decision.functions import LearnedShape
 from accelstudy.diagnosis.decision.posterior import Explanation
 from accelstudy.diagnosis.decision.statement import (
     Cosine,
     Part,
+    Reason,
     Statement,
     statement_of,
 )
-from accelstudy.diagnosis.decision.verdict import Reason
 from accelstudy.diagnosis.file_format import Found
 from accelstudy.diagnosis.result import CampaignDiagnosis
 from accelstudy.diagnosis.rules import RULES
-from accelstudy.diagnosis.shape import TARGETS, LearnedShape, coordinate_of
 from accelstudy.effects import Effect, get_effect
-from accelstudy.effects.learned import LEARNED, LearnedFunction
+from accelstudy.effects.learned import LEARNED, WAVES, LearnedFunction
 from accelstudy.leveling.error import MAX_TILT_GON
 from accelstudy.pages import render_lines
 from accelstudy.sensors.plausibility import USUAL_CAUSE  # noqa: F401 (of the template)
@@ -64,11 +72,6 @@ def verdict_lines(diagnosis: CampaignDiagnosis) -> list[str]:
     return render("verdict", diagnosis)
 
 
-def warnings(diagnosis: CampaignDiagnosis) -> list[str]:
-    """Say what a user of the calibration has to know."""
-    return render("warnings", diagnosis)
-
-
 def clauses(of: Reason) -> list[str]:
     """Clauses of a reason; none where it is empty."""
     return render("reason", of)
@@ -81,14 +84,14 @@ def sentence(text: str) -> str:
 
 def badge(diagnosis: CampaignDiagnosis) -> str:
     """Name the badge of a page: the verdict or, where there is none, the state of a calibration."""
-    if diagnosis.code == "weak":
+    if diagnosis.reason.code == "weak":
         return ACCEPTED
     return UNCHECKED if too_few(diagnosis) else diagnosis.verdict
 
 
 def too_few(diagnosis: CampaignDiagnosis) -> bool:
     """Whether nothing was found since nothing could be tested."""
-    return diagnosis.verdict == "no_effect" and not diagnosis.detection.densities
+    return diagnosis.verdict == "no_effect" and not diagnosis.problem.detection.densities
 
 
 def noise_only(diagnosis: CampaignDiagnosis) -> float:
@@ -141,6 +144,72 @@ def change_text(diagnosis: CampaignDiagnosis) -> str:
 # --- a function without a name ------------------------------------------------------------------
 
 
+class Coordinate(NamedTuple):
+    """How people see a coordinate.
+
+    Attributes
+    ----------
+    words : str
+    place : str, the same where no axis is meant
+    unit : str, of its values
+    size : float, SI size of that unit
+    """
+
+    words: str
+    place: str
+    unit: str
+    size: float = 1.0
+
+    def at(self, value: float) -> str:
+        """Show a value."""
+        return f"{number(value / self.size)} {self.unit}".rstrip()
+
+
+def coordinate_of(name: str) -> Coordinate:
+    """Describe a coordinate of a learned effect, or of a place."""
+    words, place, unit, size = COORDINATES[WAVES.get(name, name)]
+    if unit == "rad":
+        unit, size = attitude_unit(), float(1 / to_attitude(1.0))
+    return Coordinate(words, place or words, unit, size)
+
+
+RATE = "the rate of the temperature", "", "K/min", 1 / 60
+COORDINATES = {
+    "angle": ("the angle", "roll and pitch", "rad", 1.0),
+    "yaw": ("the yaw", "", "rad", 1.0),
+    "move": ("the last move of the robot", "", "rad", 1.0),
+    "force": ("the force along the same axis", "the force", "m/s²", 1.0),
+    "previous": ("the force in the position before", "", "m/s²", 1.0),
+    "next": ("the step to the next position", "", "m/s²", 1.0),
+    "vibration": ("the vibration", "vibration", "m/s²", 1.0),
+    "temperature": ("the temperature", "temperature", "°C", 1.0),
+    "temperature rate": RATE,
+    "dT/dt": RATE,
+    "time": ("the time", "time", "min", 60.0),
+    "order": ("the number of the position", "", "", 1.0),
+}
+"""Words of each coordinate, also where no axis is meant if these are others, and its unit."""
+TARGETS = {
+    "bias": ("bias of {}", "the bias of {}", "a bias"),
+    "scale": ("scale of {}", "the scale of {}", "a scale"),
+    "square": ("quadratic scale of {}", "the quadratic scale of {}", "a scale"),
+    "nonorthogonality": ("non-orthogonality {}", "the non-orthogonality {}", "a non-orthogonality"),
+    "mounting": ("rotation about {}", "the rotation of the sensor on its mounting about {}",
+                 "a rotation of the sensor on its mounting"),
+    "reading": ("reading of {}", "the robot's reading of {}", "an error of the robot's readings"),
+    "tilt": ("tilt {}", "the tilt of the robot's base ({})", "a tilt of the base"),
+}  # fmt: skip
+"""Words of what depends on a coordinate: short and in a sentence, with a place for the components,
+and in a sentence without them."""
+
+
+def subject(shape: LearnedShape) -> str:
+    """Say what depends on what: the bias of x and y depends on the yaw."""
+    which = "all axes" if len(shape.axes) == len("xyz") else comma_list(shape.axes)
+    _, what, _ = TARGETS[shape.effect.target]
+    return f"{what.format(which)} depends on {coordinate_of(shape.effect.coordinate).words}"
+
+
 def like_text(diagnosis: CampaignDiagnosis) -> str:
     """Say of what that which is missing may be a function; nothing where that is open."""
     worth = [one for one in diagnosis.like if one.posterior >= MIN_SAID]
@@ -150,7 +219,7 @@ def like_text(diagnosis: CampaignDiagnosis) -> str:
     if named and worth and worth[0].posterior < MIN_PLACE_SAID:
         return ""  # the figure has all of it
     places = {
-        f"{TARGETS[one.target].alone} that varies with {coordinate_of(one.coordinate).place}": (
+        f"{TARGETS[one.target][2]} that varies with {coordinate_of(one.coordinate).place}": (
             one.posterior
         )
         for one in worth
@@ -160,9 +229,8 @@ def like_text(diagnosis: CampaignDiagnosis) -> str:
 
 def extents_text(shape: LearnedShape) -> str:
     """Say how far a learned function goes up and down in a session."""
-    unit = TARGETS[shape.effect.target].unit
-    sizes = [f"{amount(size, unit)} ({axis})" for axis, size in shape.extents.items()]
-    return f"{comma_list(sizes)} {shown_unit(unit)}".rstrip()
+    sizes = [f"{amount(size, shape.unit)} ({axis})" for axis, size in shape.extents.items()]
+    return f"{comma_list(sizes)} {shown_unit(shape.unit)}".rstrip()
 
 
 def range_text(diagnosis: CampaignDiagnosis) -> str:

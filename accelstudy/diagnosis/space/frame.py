@@ -142,27 +142,18 @@ class SessionFit:
         # A force that passes a knee at the ideal sensor may not do so along the real axes.
         sizes = np.linalg.norm(projected @ directions, axis=1)
         also, basis, rank = spans(columns @ directions, sizes, ROUNDING)
-        for i in np.flatnonzero(rank < seen):
+        for i in np.flatnonzero(rank < seen).tolist():
             directions[i] = directions[i] @ also[i]
             ideal[i] = spans((projected[i] @ directions[i])[None], None, ROUNDING)[1][0]
-        found = [
-            Hypothesis(
-                name=effect.name,
-                effect=effect,
-                directions=directions[i, :, : rank[i]],
-                basis=basis[i, :, : rank[i]],
-                ideal=ideal[i, :, : rank[i]],
-            )
-            if rank[i]
-            else None
-            for i, effect in enumerate(shapes)
-        ]
-        if not np.isfinite(shapes[0].bounds).any():
-            return found
-        return [
-            None if one is None else replace(one, estimates=_estimates(one, columns[i]))
-            for i, one in enumerate(found)
-        ]
+        bounded, found = np.isfinite(shapes[0].bounds).any(), list[Hypothesis | None]()
+        for i, (effect, dim) in enumerate(zip(shapes, rank.tolist(), strict=True)):
+            space = basis[i, :, :dim]
+            hypothesis = Hypothesis(
+                effect.name, effect, directions[i, :, :dim], space, ideal[i, :, :dim],
+                estimates=_estimates(space.T @ columns[i]) if dim and bounded else None,
+            )  # fmt: skip
+            found.append(hypothesis if dim else None)
+        return found
 
     # --- all that the model may lack --------------------------------------------------------
 
@@ -262,12 +253,16 @@ def _of_robot(effect: Effect) -> bool:
     return effect.part == "rig" and bool({"roll", "pitch", "yaw"} & {*columns})
 
 
-def _estimates(hypothesis: Hypothesis, columns: Array) -> Array:
-    """Turn products of a basis with residuals into the parameters that show; columns (m, k)."""
+def _estimates(shown: Array) -> Array:
+    """Turn products of a basis (m, l) with residuals into the l parameters that show most.
+
+    Parameters
+    ----------
+    shown : (l, k) array, products of the basis with the signatures of all parameters
+    """
     from scipy.linalg import qr  # slow to import, and seldom needed
 
-    shown = hypothesis.basis.T @ columns
-    most = qr(shown, mode="r", pivoting=True)[1][: hypothesis.dim]
+    most = qr(shown, mode="r", pivoting=True)[1][: len(shown)]
     return np.asarray(np.linalg.inv(shown[:, most]))
 
 

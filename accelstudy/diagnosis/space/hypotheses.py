@@ -7,13 +7,14 @@ is known of its l parameters. A smooth function of a coordinate has a covariance
 
 from __future__ import annotations
 
+from abc import ABC, abstractmethod
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import NDArray
 
 from accelstudy.adjustment.quality import root_of
 from accelstudy.diagnosis.rules import RULES
@@ -98,24 +99,19 @@ class Hypothesis:
 
 
 @dataclass(frozen=True)
-class Shapes:
+class Shapes(ABC):
     """Alternatives of one thing that may be missing: s covariances λ K of the residuals.
 
     Attributes
     ----------
     prior : (s,) array, prior probabilities, which sum to 1
-    shares : tuple of s arrays (l,), eigenvalues of each K, which sum to 1
-    vectors : (m, Σ l) array, its eigenvectors, one shape beside the other
+    dims : (s,) int array, ranks l of the K
+    vectors : (m, Σ l) array, their eigenvectors, one shape beside the other
     """
 
     prior: Array
-    shares: tuple[Array, ...]
+    dims: NDArray[np.int_]
     vectors: Array
-
-    @cached_property
-    def dims(self) -> NDArray[np.int_]:
-        """Number of eigenvectors of each shape, (s,)."""
-        return np.array([len(share) for share in self.shares], dtype=int)
 
     @cached_property
     def ends(self) -> NDArray[np.int_]:
@@ -126,19 +122,14 @@ class Shapes:
         """Divide what there is of each eigenvector, (..., Σ l), by shape."""
         return np.split(along, self.ends[1:-1], axis=-1)
 
-    def parts(self, errors: Array) -> Array:
-        """What the densities need of residuals (..., m): squares along the vectors, (..., Σ l)."""
-        return np.asarray((errors @ self.vectors) ** 2)
+    @abstractmethod
+    def logs(self, evidence: Evidence, errors: Array) -> Array:
+        """Log density of residuals (..., m) under each shape, (..., s)."""
 
-    def logs(self, evidence: Evidence, parts: Array, squares: ArrayLike) -> Array:
-        """Log density of residuals under each shape, (..., s), by their parts and ‖z‖² (...)."""
-        along = self.split(np.atleast_2d(parts))
-        logs = evidence.shapes_density(along, self.shares, np.atleast_1d(squares))
-        return logs.reshape(*np.shape(squares), -1)
-
-    def log_density(self, evidence: Evidence, parts: Array, squares: ArrayLike) -> Array:
-        """Log density of residuals over all shapes, (...)."""
-        return log_sum(self.logs(evidence, parts, squares) + np.log(self.prior))
+    def log_density(self, evidence: Evidence, errors: Array) -> Array:
+        """Log density of residuals (..., m) over all shapes, (...)."""
+        logs = self.logs(evidence, errors) + np.log(self.prior)
+        return np.asarray(np.logaddexp.reduce(logs, axis=-1))
 
 
 class Spaces(Shapes):
@@ -148,28 +139,10 @@ class Spaces(Shapes):
         """Squares of what residuals (..., m) have in each space, (..., s)."""
         return np.add.reduceat((errors @ self.vectors) ** 2, self.ends[:-1], axis=-1)
 
-    def logs(self, evidence: Evidence, parts: Array, squares: ArrayLike) -> Array:
-        """Log density of residuals under each shape, (..., s)."""
-        return evidence.spaces_density(parts, self.dims, squares)
-
-    def gain_and_growth(self, parts: Array, size: float) -> tuple[Array, Array]:
-        """What λ K takes of ‖z‖², (..., s), and log|I + λ K|, (s,)."""
-        g = size / self.dims
-        return parts * (g / (1 + g)), np.asarray(self.dims * np.log1p(g), dtype=float)
-
-    def combine(self, places: NDArray[np.int_], amounts: Array) -> Array:
-        """Sum vectors of some shapes, (b, m), with weights (Σ l,), one shape after the other."""
-        dims = self.dims[places]
-        rows = np.repeat(np.arange(len(places)), dims)
-        first = np.repeat(self.ends[places] - (np.cumsum(dims) - dims), dims)
-        columns = np.zeros((len(places), self.vectors.shape[1]))
-        columns[rows, first + np.arange(len(rows))] = amounts
-        return np.asarray(columns @ self.vectors.T)
-
-
-def even(dim: int) -> Array:
-    """Eigenvalues of a space of which nothing else is known, (dim,)."""
-    return np.full(dim, 1 / max(dim, 1))
+    def logs(self, evidence: Evidence, errors: Array) -> Array:
+        """Log density of residuals (..., m) under each shape, (..., s)."""
+        squares = np.sum(errors**2, axis=-1)
+        return evidence.spaces_density(self.parts(errors), self.dims, squares)
 
 
 @dataclass(frozen=True)
@@ -179,7 +152,7 @@ class Hypotheses(Spaces):
     Attributes
     ----------
     prior : (s,) array, even over the logarithm of a smooth setting, else even
-    shares, vectors : as in `Shapes`
+    dims, vectors : as in `Shapes`
     hypotheses : tuple of Hypothesis, whose bases are columns of the vectors
     """
 
@@ -188,11 +161,11 @@ class Hypotheses(Spaces):
     @classmethod
     def of(cls, hypotheses: Sequence[Hypothesis]) -> Hypotheses:
         """Gather shapes."""
-        weights, shares = np.ones(len(hypotheses)), tuple(even(h.dim) for h in hypotheses)
+        weights, dims = np.ones(len(hypotheses)), np.array([h.dim for h in hypotheses])
         if len(hypotheses) > 1 and hypotheses[0].smooth is not None:
             weights = np.gradient(np.log([h.value for h in hypotheses]))
         vectors = np.concatenate([h.basis for h in hypotheses], axis=1)
-        shapes = cls(weights / weights.sum(), shares, vectors, ())
+        shapes = cls(weights / weights.sum(), dims, vectors, ())
         each = zip(hypotheses, shapes.split(vectors), strict=True)
         return replace(shapes, hypotheses=tuple(replace(h, basis=basis) for h, basis in each))
 
@@ -264,7 +237,7 @@ def repeats_of(residuals: Residuals, forces: Array) -> Spaces | None:
         return None
     basis = space_of_attitudes(residuals, labels)
     dim = basis.shape[1]
-    return Spaces(np.ones(1), (even(dim),), basis) if 0 < dim < residuals.redundancy else None
+    return Spaces(np.ones(1), np.array([dim]), basis) if 0 < dim < residuals.redundancy else None
 
 
 def clusters(forces: Array) -> NDArray[np.int_]:
@@ -278,13 +251,13 @@ def clusters(forces: Array) -> NDArray[np.int_]:
     return labels
 
 
-# --- arithmetic -----------------------------------------------------------------------------------
+# --- several spaces -------------------------------------------------------------------------------
 
 
-def log_sum(logs: Array) -> Array:
-    """Log of the sum of exp(logs) over the last axis."""
-    top = np.max(logs, axis=-1, keepdims=True)
-    return np.asarray(top[..., 0] + np.log(np.sum(np.exp(logs - top), axis=-1)))
+def joint_basis(hypotheses: Sequence[Hypothesis], m: int) -> Array:
+    """Orthonormal basis (m, l) of the spaces of some hypotheses together."""
+    bases = [np.zeros((m, 0)), *(h.basis for h in hypotheses)]
+    return np.asarray(np.linalg.qr(np.concatenate(bases, axis=1))[0])
 
 
 def cosines(a: Array, b: Array) -> Array:

@@ -16,12 +16,12 @@ from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, TypeAlias
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import NDArray
 from scipy.linalg import block_diag
 
 from accelstudy.diagnosis.rules import RULES
 from accelstudy.diagnosis.space.frame import HoldColumns, SessionFit
-from accelstudy.diagnosis.space.hypotheses import Shapes, Spaces, log_sum
+from accelstudy.diagnosis.space.hypotheses import Shapes, Spaces
 from accelstudy.effects.learned import TARGETS, added_by
 from accelstudy.effects.smooth import (
     CYCLES,
@@ -63,11 +63,13 @@ class LearnedShapes(Shapes):
     prior : (s,) array, even over the coordinates, then over their targets, over the kinds of
         functions that are tried of each, and over their smoothness; the attitude counts as one
         coordinate. Where a column is absent, slow changes with time have more
-    shares, vectors : as in `Shapes`
+    dims, vectors : as in `Shapes`
+    shares : tuple of s arrays (l,), eigenvalues of each K, which sum to 1
     places : tuple of Place, s
     attitude : Spaces or None, everything but the differences of repeated positions, the last place
     """
 
+    shares: tuple[Array, ...]
     places: tuple[Place, ...]
     attitude: Spaces | None = None
 
@@ -126,7 +128,8 @@ class LearnedShapes(Shapes):
             significant = np.flatnonzero(values > MIN_TRACE_SHARE * values.sum())[-MAX_DIRECTIONS:]
             vectors.append(root @ (turned[:, significant] / np.sqrt(values[significant])))
             shares.append(values[significant] / values[significant].sum())
-        return cls(weights, tuple(shares), np.concatenate(vectors, axis=1), tuple(places))
+        dims = np.array([len(share) for share in shares], dtype=int)
+        return cls(weights, dims, np.concatenate(vectors, axis=1), tuple(shares), tuple(places))
 
     def orthogonal_to(self, basis: Array) -> LearnedShapes:
         """What is left of the shapes beside a space with an orthonormal basis (m, l)."""
@@ -136,28 +139,25 @@ class LearnedShapes(Shapes):
         places, weights = [self.places[i] for i in seen], self.prior[seen]
         return self._of(places, weights / weights.sum(), [roots[i] for i in seen], len(basis))
 
-    def parts(self, errors: Array) -> Array:
-        """Squares of residuals (..., m) along the vectors, and in the space of the attitude."""
-        squares = super().parts(errors)
-        if self.attitude is None:
-            return squares
-        return np.concatenate([squares, self.attitude.parts(errors)], axis=-1)
-
-    def logs(self, evidence: Evidence, parts: Array, squares: ArrayLike) -> Array:
-        """Log density of residuals under each shape, (..., s), by their parts and ‖z‖² (...)."""
-        logs = [np.zeros((*np.shape(squares), 0))]
+    def logs(self, evidence: Evidence, errors: Array) -> Array:
+        """Log density of residuals (..., m) under each shape, (..., s)."""
+        logs = [np.zeros((*errors.shape[:-1], 0))]
         if self.shares:
-            logs.append(super().logs(evidence, parts[..., : self.ends[-1]], squares))
+            rows = np.atleast_2d(errors)
+            along = self.split((rows @ self.vectors) ** 2)
+            seen = evidence.shapes_density(along, self.shares, np.sum(rows**2, axis=-1))
+            logs.append(seen.reshape(*errors.shape[:-1], -1))
         if self.attitude is not None:
-            logs.append(self.attitude.logs(evidence, parts[..., self.ends[-1] :], squares))
+            logs.append(self.attitude.logs(evidence, errors))
         return np.concatenate(logs, axis=-1)
 
     def place_densities(self, evidence: Evidence, errors: Array) -> dict[Place, Array]:
         """Log density of residuals (..., m) under the shapes of each place, times its prior."""
-        squares = np.sum(errors**2, axis=-1)
-        logs = self.logs(evidence, self.parts(errors), squares) + np.log(self.prior)
+        logs = self.logs(evidence, errors) + np.log(self.prior)
         of_place = {p: [q == p for q in self.places] for p in dict.fromkeys(self.places)}
-        return {place: log_sum(logs[..., some]) for place, some in of_place.items()}
+        return {
+            place: np.logaddexp.reduce(logs[..., some], axis=-1) for place, some in of_place.items()
+        }
 
 
 # --- coordinates --------------------------------------------------------------------------------
@@ -338,7 +338,5 @@ def _for_each_component(h: Array, count: int) -> Array:
     They are of its own argument or, where there is one argument for all, of that.
     """
     n, _, k = h.shape
-    parts = np.zeros((n, count, count, k))
-    for i in range(count):
-        parts[:, i, i] = h[:, i if h.shape[1] == count else 0]
-    return parts.reshape(n, count, -1)
+    each = np.broadcast_to(h, (n, count, k))
+    return np.einsum("nik,ij->nijk", each, np.eye(count)).reshape(n, count, -1)

@@ -1,31 +1,42 @@
-"""Tests of the noise: its level, axes, colour, tails and resolution, and the noise within holds.
+"""The evidence for wrong noise: its level, axes, colour, tails and resolution.
 
-Those of axes and colour have the log evidence for such noise as their statistic. That of the tails
-needs no sigma: simulations of Gaussian noise in the same adjustment show what is usual.
+Axes and colour have a restricted likelihood. In the residual space (Harville 1974, restricted
+maximum likelihood), with N an orthonormal basis of it, U one of the design, and Σ the covariance of
+the noise,
+
+    log|Nᵀ Σ N| = log|Σ| + log|Uᵀ Σ⁻¹ U|,
+    zᵀ (Nᵀ Σ N)⁻¹ z = zᵀ Σ⁻¹ z − zᵀ Σ⁻¹ U (Uᵀ Σ⁻¹ U)⁻¹ Uᵀ Σ⁻¹ z.
+
+Unequal axes: the variances of the axes have the ratios κ, log κ_i summing to zero. Residuals alone
+say little of them where the redundancy is small, so κ has a prior: about equal axes, within a
+factor of two or so, and where the noise within the holds is known, about its ratios.
+
+Coloured noise: successive holds are correlated. The processes are those of `LENGTHS`: the
+first-order Gauss–Markov process of `coloured_noise`, whose τ counts holds here, and a random walk,
+min(i, j)/n. A process of strength s adds s K to the covariance of the residuals, as a smooth
+function of the time does.
+
+The tests of axes and colour have this log evidence as their statistic. That of the tails needs no
+sigma: simulations of Gaussian noise in the same adjustment show what is usual.
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy import special
 
-from accelstudy.adjustment.quality import Solution, global_test, pooled_variance
+from accelstudy.adjustment.quality import global_test
 from accelstudy.basics.levels import REFUTATION_LEVEL
-from accelstudy.campaign.calibration.campaign_fit import NoiseJudgement
-from accelstudy.campaign.session import Campaign
 from accelstudy.diagnosis.evidence.detection import Chance
+from accelstudy.diagnosis.evidence.size import Evidence, log_mean
 from accelstudy.diagnosis.rules import RULES
-from accelstudy.diagnosis.space.frame import SessionFit
-from accelstudy.diagnosis.space.hypotheses import clusters, space_of_attitudes
+from accelstudy.diagnosis.space.hypotheses import clusters
 from accelstudy.diagnosis.space.residuals import Residuals
-
-if TYPE_CHECKING:
-    from accelstudy.diagnosis.decision.problem import Problem
+from accelstudy.noise_effects.coloured_noise import autocorrelation
 
 Array = NDArray[np.float64]
 
@@ -217,114 +228,8 @@ def _step(values: Array, around: Array) -> float:
     return float(divisors[power > 0.99 * power[0]].max() / peak)
 
 
-# --- what they mean together ---------------------------------------------------------------------
-
 SPECIFIC = (STEPS, COLOUR, AXES, TAILS, LEVEL)
 """What may be wrong with the noise, the most specific first."""
-
-
-class Misfit(NamedTuple):
-    """Ratio of the residuals of a fit to the noise."""
-
-    ratio: float
-    of_repeats: bool
-    """Whether the noise is what repeated positions differ by, and not what is stated."""
-
-
-def misfit(problem: Problem, solution: Solution) -> Misfit | None:
-    """Return by how much the residuals are larger than the noise; None if they are not.
-
-    The noise is the given sigma. Where none is given, or where repeated positions refute it even
-    after the refit, it is the difference of repeated positions.
-    """
-    stated = problem.evidence.level.known
-    if (
-        stated
-        and 2 * float(special.chdtrc(solution.redundancy, solution.omega)) >= REFUTATION_LEVEL
-    ):
-        return None
-    ratio = float(np.sqrt(solution.omega / solution.redundancy))
-    than_stated = Misfit(ratio, of_repeats=False) if stated else None
-    left = Residuals.of(solution)
-    labels = clusters(problem.frame.forces)
-    if len(labels) != len(solution.misclosures) or len(np.unique(labels)) == len(labels):
-        return than_stated
-    square, freedom = _square_of_repeats(left, space_of_attitudes(left, labels))
-    if not freedom or (stated and special.chdtrc(freedom, square) >= REFUTATION_LEVEL / 2):
-        return than_stated
-    if _lack_of_fit(left, square, freedom) >= REFUTATION_LEVEL:
-        return None
-    return than_stated or Misfit(ratio / float(np.sqrt(square / freedom)), of_repeats=True)
-
-
-def lack_of_fit(problem: Problem) -> float:
-    """p-value of the test whether repeats agree better with each other than with the model."""
-    residuals, same = problem.residuals, problem.attitude
-    if same is None:
-        return 1.0
-    return _lack_of_fit(residuals, *_square_of_repeats(residuals, same.vectors))
-
-
-def _lack_of_fit(residuals: Residuals, square: float, freedom: int) -> float:
-    """F test of all but the differences of repeats against these differences."""
-    rest = residuals.redundancy - freedom
-    if not freedom or not rest:
-        return 1.0
-    ratio = (float(residuals.z @ residuals.z) - square) / rest / (square / freedom)
-    return float(special.fdtrc(rest, freedom, ratio))
-
-
-def _square_of_repeats(residuals: Residuals, same: Array) -> tuple[float, int]:
-    """Square of the differences of repeated positions, and its degrees of freedom.
-
-    Parameters
-    ----------
-    residuals : Residuals
-    same : (m, l) array, orthonormal basis of what they have in common
-    """
-    z = residuals.z
-    square = float(z @ z - np.sum((z @ same) ** 2))
-    return max(square, 0.0), residuals.redundancy - same.shape[1]
-
-
-def tests_of_noise(
-    problem: Problem, campaign: Campaign, frame: SessionFit
-) -> tuple[NoiseTest, ...]:
-    """All tests of the noise that a campaign allows, on the residuals of the base or final fit."""
-    if problem.exact:
-        return ()
-    residuals, base, chance = frame.residuals, problem.residuals, problem.chance
-    sigma, sigma_base = (float(np.mean(one.sigmas[:, :3])) for one in (residuals, base))
-    # With a sigma far too large, the attitudes would look like steps.
-    least = sigma_base * min(1.0, float(np.sqrt(base.variance)))
-    stated = problem.evidence.level.known
-    tests = [level_test(residuals, frame.solution.sigma_dof)] if stated else []
-    axes, colour = problem.at(frame).noise_evidence
-    tests += [
-        axis_test(residuals, axes),
-        colour_test(residuals, colour),
-        tail_test(residuals, chance),
-        resolution_test(campaign.forces, least),
-    ]
-    if campaign.sd is not None and campaign.n_samples is not None:
-        tests.append(within_hold_test(residuals, sigma, campaign.sd, campaign.n_samples))
-    return tuple(tests)
-
-
-def judged_noise(problem: Problem, frame: SessionFit) -> NoiseJudgement:
-    """Judge the noise by the residuals of a fit, which give it where no stated sigma holds."""
-    residuals = frame.residuals
-    stated, r = problem.evidence.level.known, residuals.redundancy
-    if not stated or level_test(residuals, frame.solution.sigma_dof).p_value < REFUTATION_LEVEL:
-        return NoiseJudgement(trusted=False, variance=residuals.variance)
-    omega = r * residuals.variance
-    return NoiseJudgement(True, pooled_variance(omega, r, frame.solution.sigma_dof))
-
-
-def exceeds_stated(problem: Problem, frame: SessionFit) -> bool:
-    """Whether sigma is given, and the residuals of a fit are larger than it allows."""
-    refuted = problem.evidence.level.known and not judged_noise(problem, frame).trusted
-    return refuted and frame.residuals.variance > 1
 
 
 def worst_of(tests: Sequence[NoiseTest]) -> NoiseTest | None:
@@ -339,3 +244,111 @@ def worst_of(tests: Sequence[NoiseTest]) -> NoiseTest | None:
     others = RULES.level_noise / max(len(counted) - (level is not None), 1)
     failed = [t for t in counted if t.p_value < (REFUTATION_LEVEL if t is level else others)]
     return min(failed, key=lambda t: SPECIFIC.index(t.name), default=None)
+
+
+# --- repeated positions --------------------------------------------------------------------------
+
+
+def lack_of_fit(residuals: Residuals, square: float, freedom: int) -> float:
+    """p-value of the test whether repeats agree better with each other than with the model.
+
+    It is the F test of all but the differences of repeats against these differences.
+
+    Parameters
+    ----------
+    residuals : Residuals
+    square, freedom : of the differences, by `square_of_repeats`
+    """
+    rest = residuals.redundancy - freedom
+    if not freedom or not rest:
+        return 1.0
+    ratio = (float(residuals.z @ residuals.z) - square) / rest / (square / freedom)
+    return float(special.fdtrc(rest, freedom, ratio))
+
+
+def square_of_repeats(residuals: Residuals, same: Array) -> tuple[float, int]:
+    """Square of the differences of repeated positions, and its degrees of freedom.
+
+    Parameters
+    ----------
+    residuals : Residuals
+    same : (m, l) array, orthonormal basis of what they have in common
+    """
+    z = residuals.z
+    square = float(z @ z - np.sum((z @ same) ** 2))
+    return max(square, 0.0), residuals.redundancy - same.shape[1]
+
+
+# --- likelihoods of unequal axes and of coloured noise -------------------------------------------
+
+LOG_RATIOS = np.linspace(-2.5, 2.5, 9)
+CONTRASTS = np.array([[2.0, -1.0, -1.0], [0.0, 1.0, -1.0]]) / np.sqrt([[6.0], [2.0]])
+
+
+def unequal_axes_density(residuals: Residuals, evidence: Evidence, within: Array | None) -> float:
+    """Log density of residuals with noise that differs from axis to axis, over the ratios.
+
+    Parameters
+    ----------
+    residuals : Residuals, of a fit with equal axes
+    evidence : Evidence
+    within : (3,) array, variances within the holds; None if unknown
+    """
+    x, y = (values.ravel() for values in np.meshgrid(LOG_RATIOS, LOG_RATIOS))
+    ratios = np.exp(np.column_stack([x, y]) @ CONTRASTS)
+    determinant, squares = _restricted(residuals, ratios)
+    densities = np.logaddexp.reduce(evidence.noise_density(squares, determinant), axis=-1)
+    prior = _normal(x, y, np.zeros(3), RULES.spread_axes)
+    if within is not None and np.all(within > 0):
+        centre = np.log(within) - np.mean(np.log(within))
+        prior = (prior + _normal(x, y, centre, RULES.spread_within)) / 2
+    return float(log_mean(densities, prior))
+
+
+def _normal(x: Array, y: Array, centre: Array, spread: float) -> Array:
+    """Normal density on the grid of contrasts, which sums to 1."""
+    a, b = CONTRASTS @ centre
+    density = np.exp(-((x - a) ** 2 + (y - b) ** 2) / (2 * spread**2))
+    return np.asarray(density / density.sum())
+
+
+def _restricted(residuals: Residuals, ratios: Array) -> tuple[Array, Array]:
+    """log|Nᵀ Σ N| and zᵀ (Nᵀ Σ N)⁻¹ z for variances (g, 3) of the axes, (g,) each."""
+    n, c = residuals.whitening.shape[:2]
+    columns = np.column_stack([residuals.absorbed, residuals.z])
+    blocks, rest = columns[: n * c].reshape(n, c, -1), columns[n * c :]
+    f = residuals.force_noise
+    covariance = np.eye(c) + np.einsum("ga,nca,nda->gncd", ratios - 1, f, f)
+    weighted = (np.linalg.inv(covariance) @ blocks).reshape(len(ratios), n * c, -1)
+    normal = columns[: n * c].T @ weighted + rest.T @ rest
+    design, mixed, square = normal[:, :-1, :-1], normal[:, :-1, -1:], normal[:, -1, -1]
+    explained = np.swapaxes(mixed, -1, -2) @ np.linalg.solve(design, mixed)
+    determinant = np.sum(np.linalg.slogdet(covariance)[1], axis=1)
+    return determinant + np.linalg.slogdet(design)[1], square - explained[:, 0, 0]
+
+
+LENGTHS = (1.0, 3.0, 8.0, np.inf)
+"""Correlation lengths in holds; infinite for the random walk."""
+STRENGTHS = np.array([0.25, 1.0, 4.0, 16.0, 64.0, 256.0, 1024.0])
+"""Variances of the process, with white noise of 1, over which the evidence is averaged."""
+
+
+def colour_kernels(n: int) -> Array:
+    """Covariance of n holds by each process, (k, n, n)."""
+    i = np.arange(n)
+    walk = (np.minimum(i[:, None], i) + 1) / n
+    lag = np.abs(i[:, None] - i)
+    return np.stack([autocorrelation(lag, x) if np.isfinite(x) else walk for x in LENGTHS])
+
+
+def coloured_density(residuals: Residuals, evidence: Evidence) -> float:
+    """Log density of residuals with coloured noise, over lengths and strengths."""
+    n, c = residuals.whitening.shape[:2]
+    f, z, logs = residuals.force_noise, residuals.z, []
+    for kernel in colour_kernels(n):
+        covariance = np.einsum("ica,ij,jda->icjd", f, kernel, f).reshape(n * c, n * c)
+        rows = residuals.project(np.pad(covariance, (0, len(z) - n * c)))
+        values, vectors = np.linalg.eigh(residuals.project(rows.T))
+        along, shares = (z @ vectors)[None] ** 2, np.maximum(values, 0.0)
+        logs.append(evidence.densities_by_size(along, shares, np.array([z @ z]), STRENGTHS))
+    return float(log_mean(np.concatenate(logs, axis=None)))
