@@ -71,7 +71,7 @@ def plan(
     confidence : float or str
         What must reach the accuracy: the rms, or both angles in so many calibrations, as 95%.
     holds : float in s, or str with a unit, or several
-        Duration of a position, as 10s; may be repeated. [default: 1 s to 120 s; 10 s for `sigma`]
+        Duration of a position, as 10s; may be repeated. [default: 5 s to 120 s; 10 s for `sigma`]
     max_time : float in s, or str with a unit
         Longest time in the field, as 20min.
     max_positions : int
