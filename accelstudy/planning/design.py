@@ -28,6 +28,7 @@ from accelstudy.design.spaces import SPACES, angles_to, find_attitudes
 from accelstudy.design.task import Task
 from accelstudy.drawing.style import FULL
 from accelstudy.files.outputs import new_file
+from accelstudy.leveling.attitudes import axes_in_words
 from accelstudy.pages.result import Result
 from accelstudy.schemes import get_scheme
 from accelstudy.sensors.models import get_model
@@ -252,8 +253,10 @@ def write_scheme(
         "source": source,
         "design": dict(provenance),
         "positions": [
-            {"position": i, "roll_gon": roll, "pitch_gon": pitch}
-            for i, (roll, pitch) in enumerate(angles.tolist(), 1)
+            {"position": i, "roll_gon": roll, "pitch_gon": pitch, "axes": axes_in_words(direction)}
+            for i, ((roll, pitch), direction) in enumerate(
+                zip(angles.tolist(), directions, strict=True), 1
+            )
         ],
         "directions": round_directions(directions).tolist(),
     }
@@ -263,6 +266,6 @@ def write_scheme(
         "# frame.\n"
     )
     text = yaml.safe_dump(
-        content, sort_keys=False, allow_unicode=True, default_flow_style=None, width=100
+        content, sort_keys=False, allow_unicode=True, default_flow_style=None, width=160
     )
     path.write_text(head + text, encoding="utf-8")

@@ -19,15 +19,19 @@ from accelstudy.campaign.session import Campaign
 from accelstudy.files.documents import Document, Part
 from accelstudy.files.outputs import ADVICE
 from accelstudy.leveling.angles import angles_of
+from accelstudy.leveling.attitudes import attitude
+from accelstudy.pages import render_lines
 from accelstudy.pages.result import Result
+from accelstudy.sensors.frames import FRD
 from accelstudy.sensors.sensor import SensorModel
-from accelstudy.sequential import wording
-from accelstudy.sequential.promise import Promise
+from accelstudy.sequential.promise import LEAST_REDUNDANCY, Promise
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
 Array = NDArray[np.float64]
+
+SENTENCES = "sequential/wording.txt.j2"
 
 
 class AngleAdvice(Part):
@@ -154,7 +158,9 @@ class Advice(Result):
     @cached_property
     def advice(self) -> list[str]:
         """All lines of the advice, most important last."""
-        return wording.advice_lines(self)
+        log = self.session.header.log
+        there = attitude(self.next, FRD if log is None else log.axes)
+        return render_lines(SENTENCES, "lines", self, there, LEAST_REDUNDANCY)
 
     @property
     def tilt(self) -> pd.DataFrame:
@@ -189,5 +195,5 @@ class Advice(Result):
     def summary(self) -> str:
         """Return the advice as text."""
         more = [f"calibrate: {self.command}"] if self.command else []
-        heading = wording.heading(self)
+        (heading,) = render_lines(SENTENCES, "heading", self)
         return "\n".join([heading, *(f"  {line}" for line in (*self.advice, *more))])

@@ -15,13 +15,13 @@ from accelstudy.basics.units import GON, MGON
 from accelstudy.campaign.calibration.fit import fit_campaign
 from accelstudy.campaign.format import read_campaign
 from accelstudy.leveling.angles import specific_force
+from accelstudy.leveling.attitudes import attitude
 from accelstudy.schemes import get_scheme
 from accelstudy.sensors.frames import parse_frame
 from accelstudy.sensors.models import get_model
 from accelstudy.sequential.advisor import advise as advice_for
 from accelstudy.sequential.choice import candidate_positions
 from accelstudy.sequential.promise import Promise
-from accelstudy.sequential.wording import attitude
 from accelstudy.simulation.sessions import Noise, session
 
 MODEL = "bias-scale-nonorthogonality"

@@ -1,45 +1,19 @@
-"""Advice in plain words; the sentences stand in `wording.txt.j2`."""
+"""Attitudes in words, for a person who puts the sensor there."""
 
 from __future__ import annotations
-
-from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
-from accelstudy import pages
 from accelstudy.basics.units import attitude_unit, to_attitude
 from accelstudy.leveling.angles import roll_pitch
 from accelstudy.sensors.frames import FRD, Frame
-from accelstudy.sequential.promise import LEAST_REDUNDANCY
-
-if TYPE_CHECKING:
-    from accelstudy.sequential.advice import Advice
 
 Array = NDArray[np.float64]
 
-SENTENCES = "sequential/wording.txt.j2"
 LEVEL = np.radians(0.5)
 """An axis within this of the horizon is level, one within this of the vertical straight up or
 down."""
-
-
-def advice_lines(advice: Advice) -> list[str]:
-    """Write the advice, most important last."""
-    log = advice.session.header.log
-    return pages.render_lines(
-        SENTENCES,
-        "lines",
-        advice,
-        attitude(advice.next, FRD if log is None else log.axes),
-        LEAST_REDUNDANCY,
-    )
-
-
-def heading(advice: Advice) -> str:
-    """Heading of the advice."""
-    (line,) = pages.render_lines(SENTENCES, "heading", advice)
-    return line
 
 
 def attitude(direction: Array, frame: Frame = FRD) -> str:
@@ -56,10 +30,14 @@ def attitude(direction: Array, frame: Frame = FRD) -> str:
     upright = np.hypot(direction[1], direction[2]) < np.sin(LEVEL)
     angles = [] if upright else [f"roll {_angle(roll)}"]
     angles.append(f"pitch {_angle(pitch)}")
+    return f"{', '.join(angles)} ({axes_in_words(direction, frame)})"
+
+
+def axes_in_words(direction: Array, frame: Frame = FRD) -> str:
+    """Describe an attitude by the directions of its axes; parameters as of `attitude`."""
     down = frame.from_frd(direction)
     straight = [i for i in range(3) if abs(down[i]) > np.cos(LEVEL)]
-    axes = [_axis("xyz"[i], down[i]) for i in (straight or range(3))]
-    return f"{', '.join(angles)} ({', '.join(axes)})"
+    return ", ".join(_axis("xyz"[i], down[i]) for i in (straight or range(3)))
 
 
 def _axis(name: str, down: float) -> str:
