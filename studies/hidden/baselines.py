@@ -43,9 +43,6 @@ class Problem:
     def __init__(self, campaign: Campaign, model: SensorModel) -> None:
         approach, self.sigma_known = usual_approach(campaign), campaign.sigma_force is not None
         fit = fit_campaign(campaign, model, approach)
-        for _ in range(0 if self.sigma_known else 2):
-            weighted = campaign.with_sigma(fit.sigma_position_posteriori)
-            fit = fit_campaign(weighted, model, approach)
         frame = SessionFit.of(fit.solution)
         self.z, self.redundancy = frame.residuals.z, frame.residuals.redundancy
         candidates = frame.candidates.items()

@@ -120,6 +120,8 @@ def fit_campaign(
 ) -> CampaignFit:
     """Calibrate a campaign, by default robot-aided if it has the robot's angles.
 
+    Where no noise is stated, weights take that of the residuals.
+
     Raises
     ------
     InputError
@@ -144,15 +146,13 @@ def fit_campaign(
         _determined(campaign, model, approach, sigma_to_show_above(campaign))
         raise InputError(f"{campaign.name}: {_cause(campaign, model, theory)}")
     fit = CampaignFit(campaign, solve(model, approach, observed, adjustment), theory)
-    prior = model.prior_weights.any() or observed.common is not None or bool(observed.known)
-    if campaign.sigma_force is None and prior and fit.solution.redundancy > 0:
-        # What is known a priori needs a sigma beside it: that of the residuals.
-        for _ in range(3):
-            sigma = max(fit.sigma_position_posteriori, 1e-9, least_sigma(campaign, approach))
-            observed = replace(observed, sigma_force=sigma)
-            adjustment = calibrate(model, approach, observed)
-            if adjustment.converged[0]:
-                fit = replace(fit, solution=solve(model, approach, observed, adjustment))
+    # Angles, and what is known a priori, need a sigma of the forces beside theirs.
+    for _ in range(3 if campaign.sigma_force is None and fit.solution.redundancy > 0 else 0):
+        sigma = max(fit.sigma_position_posteriori, 1e-9, least_sigma(campaign, approach))
+        observed = replace(observed, sigma_force=sigma)
+        adjustment = calibrate(model, approach, observed)
+        if adjustment.converged[0]:
+            fit = replace(fit, solution=solve(model, approach, observed, adjustment))
     blur = sigma_to_show_above(campaign)
     if campaign.sigma_force is None and 0 <= fit.sigma_position_posteriori < LEAST_SCATTER:
         raise InputError(

@@ -81,7 +81,7 @@ class BaseFit:
 
 
 def fit_base(campaign: Campaign, model: SensorModel, approach: Approach) -> BaseFit:
-    """Fit a model to a campaign; where no sigma is given, weights take that of the residuals.
+    """Fit a model to a campaign, and say what is known of its noise.
 
     Raises
     ------
@@ -94,25 +94,18 @@ def fit_base(campaign: Campaign, model: SensorModel, approach: Approach) -> Base
             f"{campaign.name}: a diagnosis compares at most {MAX_POSITIONS} positions, and there "
             f"are {campaign.n_positions}; give a part of them, or the means of repeated ones"
         )
-    stated, measured = campaign.sigma_force is not None, campaign
-    # Without a sigma the weights of forces and angles need one: that of the residuals.
-    for _ in range(1 if stated else 3):
-        fit = fit_campaign(measured, model, approach)
-        if fit.solution.redundancy <= 0:
-            raise InputError(
-                f"{campaign.name}: {campaign.n_positions} positions leave no redundancy beside "
-                f"the {model.n_parameters} parameters of {model.name!r}: nothing can "
-                "be tested; more positions are needed"
-            )
-        if not stated:
-            least = max(1e-9, least_sigma(campaign, approach))
-            sigma = max(fit.sigma_position, least)
-            measured = measured.with_sigma(sigma)
+    fit = fit_campaign(campaign, model, approach)
     solution = fit.solution
+    if solution.redundancy <= 0:
+        raise InputError(
+            f"{campaign.name}: {campaign.n_positions} positions leave no redundancy beside "
+            f"the {model.n_parameters} parameters of {model.name!r}: nothing can "
+            "be tested; more positions are needed"
+        )
     sd, n, within = campaign.sd, campaign.n_samples, None
     if sd is not None and n is not None and np.all(sd > 0):
         within = np.asarray(np.mean(sd**2 / n[:, None], axis=0))
-    if stated:
+    if campaign.sigma_force is not None:
         return BaseFit(solution, Level.of_stated_sigma(solution.sigma_dof), within)
     if within is None or np.mean(within) <= least_sigma(campaign, approach) ** 2:
         return BaseFit(solution, Level.of_nothing_stated(), within)
