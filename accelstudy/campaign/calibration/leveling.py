@@ -171,8 +171,7 @@ class Leveling:
         calibration, forces, hold = self.calibration, self.forces[rows], self.hold.take(rows)
         noise = calibration.noise_of_reading if self.sigma is None else self.sigma
         with np.errstate(all="ignore"):  # forces that are not finite are counted later
-            corrected = calibration.correct(forces, hold)
-            angles, sigmas = calibration.level(forces, noise, hold)
+            corrected, angles, sigmas = calibration.correct_and_level(forces, noise, hold)
         lost = np.asarray(~np.isfinite(corrected + angles[:, :1]).all(axis=1))
         full = calibration.document.range_mps2 or np.inf
         lost |= (np.abs(forces) >= SATURATED_SHARE * full).any(axis=1)

@@ -175,8 +175,10 @@ class SensorCalibration:
         -------
         (n, 3) array, m/s²; NaN where no force explains the reading
         """
-        forces, _ = self._continue_drifts(np.asarray(forces, dtype=float), hold)
-        return self.model.correct(forces, self.parameters, self.gravity, hold)
+        sessions, share, hold = self._sessions(forces, hold)
+        return self.model.correct(sessions, share * self.parameters, self.gravity, hold).reshape(
+            -1, 3
+        )
 
     def level(
         self, forces: ArrayLike, sigma_force: float, hold: HoldConditions | None = None
@@ -194,42 +196,44 @@ class SensorCalibration:
         angles, sigma : (n, 2) arrays, rad; sigma combines the noise of the reading and the
         uncertainty of the calibration
         """
-        forces, share = self._continue_drifts(np.asarray(forces, dtype=float), hold)
-        corrected = self.model.correct(forces, self.parameters, self.gravity, hold)
-        at = self.model, self.parameters, forces, corrected, self.gravity, hold
-        slope = share * tilt_slope(*at)
+        return self.correct_and_level(forces, sigma_force, hold)[1:]
+
+    def correct_and_level(
+        self, forces: ArrayLike, sigma_force: float, hold: HoldConditions | None = None
+    ) -> tuple[Array, Array, Array]:
+        """Return what `correct` and `level` do, of one solution of the equations."""
+        sessions, share, hold = self._sessions(forces, hold)
+        model, p, g = self.model, share * self.parameters, self.gravity
+        corrected = model.correct(sessions, p, g, hold)
+        slope = share[:, None, None] * tilt_slope(model, p, sessions, corrected, g, hold)
         variance = np.sum((slope @ self.covariance) * slope, axis=-1)
-        variance += np.square(sigma_force) * np.sum(tilt_by_output(*at) ** 2, axis=-1)
-        return angles_of(corrected), np.sqrt(variance)
+        by_output = tilt_by_output(model, p, sessions, corrected, g, hold)
+        variance += np.square(sigma_force) * np.sum(by_output**2, axis=-1)
+        corrected, sigma = corrected.reshape(-1, 3), np.sqrt(variance).reshape(-1, 2)
+        return corrected, angles_of(corrected), sigma
 
-    def _continue_drifts(self, forces: Array, hold: HoldConditions | None) -> tuple[Array, Array]:
-        """Extrapolate drifts in the readings beyond the session, as the model does.
+    def _sessions(
+        self, forces: ArrayLike, hold: HoldConditions | None
+    ) -> tuple[Array, Array, HoldConditions | None]:
+        """Readings as sessions with parameters of their own.
 
-        A drift is known within its session only. After it the sensor keeps the value at its end.
+        A drift is known within the session of the calibration only. After it the sensor keeps the
+        value at its end, as if the drift had been slower; so each reading is a session by itself.
 
         Returns
         -------
-        forces : (n, 3) array, m/s²
-        share : (n, 1, u) array, factors for derivatives by the parameters of such drifts
+        forces : (s, k, 3) array, m/s²
+        share : (s, u) array, factors of the parameters
+        hold : HoldConditions of s sessions of k readings
         """
-        share = np.ones((len(forces), 1, self.model.n_parameters))
-        if hold is None or "time_s" not in self.ranges or not self.drifts:
-            return forces, share
-        time = hold.column("time")
-        kept = np.clip(time, 0.0, self.ranges["time_s"][1])
-        part = np.divide(kept, time, out=np.ones_like(time), where=time != 0)[:, None]
-        before_last = np.zeros_like(forces)
-        for effect, columns in self.model.parts:
-            if effect.drifts:  # in proportion to time
-                f, p = tuple(forces.T), tuple(self.parameters[columns])
-                added = np.stack(effect.output(f, p, self.gravity, hold, np), axis=-1)
-                before_last += (1 - part) * added
-                share[:, 0, columns] = part
-        change = before_last[..., None]
-        if any(effect.last for effect in self.model.effects):
-            f_a = self.model.sensitive_force(forces, self.parameters, self.gravity, hold)
-            change = self.model.slope_of_last(f_a, self.parameters, hold) @ change
-        return forces + change[..., 0], share
+        forces = np.asarray(forces, dtype=float)
+        if hold is None or hold.time is None or "time_s" not in self.ranges or not self.drifts:
+            return forces[None], np.ones((1, self.model.n_parameters)), hold
+        kept = np.clip(hold.time, 0.0, self.ranges["time_s"][1])
+        part = np.divide(kept, hold.time, out=np.ones_like(kept), where=hold.time != 0)
+        drifts = [effect.drifts for effect in self.model.effects for _ in effect.parameters]
+        each = hold.take(np.arange(len(forces))[:, None])
+        return forces[:, None], np.where(drifts, part[:, None], 1.0), each
 
 
 def read_calibration(path: str | Path) -> SensorCalibration:
