@@ -10,7 +10,7 @@ import pandas as pd
 from accelstudy.basics.units import MGON, recorded_unit, to_recorded
 from accelstudy.campaign.calibration.campaign_fit import CampaignFit
 from accelstudy.campaign.calibration.file_format import CalibrationDocument
-from accelstudy.campaign.calibration.sensor_calibration import FORCES
+from accelstudy.campaign.calibration.sensor_calibration import FORCE_RANGES
 from accelstudy.campaign.calibration.wording import verdict_lines
 from accelstudy.leveling.error import MAX_TILT_GON
 from accelstudy.sensors.frames import FRD
@@ -29,7 +29,7 @@ def calibration_document(fit: CampaignFit) -> dict[str, Any]:
         "time_s": campaign.time,
         "temperature_degC": campaign.temperature,
         "vibration_mps2": campaign.vibration,
-        **dict(zip(FORCES, fit.corrected.T, strict=True)),
+        **dict(zip(FORCE_RANGES, fit.corrected.T, strict=True)),
     }
     content = {
         "campaign": campaign.name,

@@ -19,9 +19,9 @@ from accelstudy.sensors.models import compose
 Array = NDArray[np.float64]
 
 REDUNDANCY, VARIANCE = Range(0, 10**9), Range(-1e18, 1e18)
-LEAST_VARIANCE = 1e-40
+MIN_VARIANCE = 1e-40
 """SI, variance below that of any estimate."""
-LEAST_REGULAR = 1e12
+MAX_MATRIX_CONDITION = 1e12
 """Condition of a matrix beyond which it has no inverse."""
 CORRELATION_TOLERANCE = 1e-6
 """Numerical tolerance of the checks of a correlation matrix."""
@@ -30,7 +30,7 @@ Matrix = list[list[float | None]]
 
 
 def _regular(matrix: list[list[float]]) -> list[list[float]]:
-    if np.linalg.cond(np.array(matrix)) > LEAST_REGULAR:
+    if np.linalg.cond(np.array(matrix)) > MAX_MATRIX_CONDITION:
         raise ValueError("must be a matrix that has an inverse")
     return matrix
 
@@ -369,7 +369,7 @@ class CalibrationDocument(Document):
 def _check_covariance(covariance: Array) -> None:
     """Raise `ValueError` unless a matrix (u, u) can be that of estimates."""
     variances = np.diag(covariance)
-    if not np.isfinite(covariance).all() or not (variances > LEAST_VARIANCE).all():
+    if not np.isfinite(covariance).all() or not (variances > MIN_VARIANCE).all():
         raise ValueError("covariance: expected variances above 0")
     correlation = covariance / np.outer(np.sqrt(variances), np.sqrt(variances))
     if np.abs(correlation - correlation.T).max() > CORRELATION_TOLERANCE:

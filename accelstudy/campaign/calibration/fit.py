@@ -28,7 +28,7 @@ from accelstudy.simulation.sessions import Noise
 
 Array = NDArray[np.float64]
 
-LEAST_RATIO = 1e-6
+MIN_SIGMA_RATIO = 1e-6
 """Smallest ratio of the noise of a direction to that of the robot's angles that double precision
 can weigh."""
 
@@ -38,7 +38,7 @@ not converge."""
 
 UNIT_SIGMA = 1e-3
 """m/s², in place of an unknown sigma; only sigmas a posteriori have a meaning then."""
-LEAST_SCATTER = 1e-18
+MIN_SCATTER = 1e-18
 """m/s²; smaller residuals are no rounding, but all zero."""
 CHEAP_SIGMA = 1e-2
 """m/s², of the means of a cheap sensor: what positions must determine a model by where neither the
@@ -62,7 +62,7 @@ def campaign_noise(campaign: Campaign) -> Noise:
 def least_sigma(campaign: Campaign, approach: Approach) -> float:
     """Smallest noise of a force, m/s², that can be weighed against that of the angles."""
     sigma_angle = campaign.header.sigma_angle or 0.0
-    return LEAST_RATIO * campaign.gravity * sigma_angle * approach.uses_angles
+    return MIN_SIGMA_RATIO * campaign.gravity * sigma_angle * approach.uses_angles
 
 
 def campaign_observations(campaign: Campaign) -> Observations:
@@ -154,7 +154,7 @@ def fit_campaign(
         if adjustment.converged[0]:
             fit = replace(fit, solution=solve(model, approach, observed, adjustment))
     blur = sigma_to_show_above(campaign)
-    if campaign.sigma_force is None and 0 <= fit.sigma_position_posteriori < LEAST_SCATTER:
+    if campaign.sigma_force is None and 0 <= fit.sigma_position_posteriori < MIN_SCATTER:
         raise InputError(
             f"{campaign.name}: the positions fit the model {model.name!r} to the last digit, as of "
             "readings in steps that are too coarse, so nothing tells their noise; state it "

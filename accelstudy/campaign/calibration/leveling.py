@@ -21,7 +21,7 @@ from accelstudy.basics.progress import show, track, warn
 from accelstudy.basics.units import attitude_unit, display_unit, to_attitude, to_display
 from accelstudy.basics.wording import one_line
 from accelstudy.campaign.calibration.sensor_calibration import (
-    FORCES,
+    FORCE_RANGES,
     RANGE_MARGIN,
     SensorCalibration,
 )
@@ -245,7 +245,7 @@ class Leveling:
             "temperature_degC": ("temperature", "°C", self.hold.temperature),
             "vibration_mps2": ("vibration", "m/s²", self.hold.vibration),
         }
-        for (name, way), force in zip(FORCES.items(), forces.T, strict=True):
+        for (name, way), force in zip(FORCE_RANGES.items(), forces.T, strict=True):
             columns[name] = "specific force", f"m/s² {way}", force
         for name, (what, unit, values) in columns.items():
             if values is None or name not in self.calibration.ranges:

@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from accelstudy import __version__
 from accelstudy.basics.errors import InputError
 from accelstudy.basics.units import GON, MGON
-from accelstudy.campaign.calibration.sensor_calibration import KNOWN, SensorCalibration
+from accelstudy.campaign.calibration.sensor_calibration import DEVICE_COLUMNS, SensorCalibration
 from accelstudy.effects.hold_conditions import REFERENCE_TEMPERATURE
 from accelstudy.leveling.angles import angles_of, wrap_angle
 from accelstudy.leveling.error import MAX_TILT_GON, cap_forces
@@ -58,7 +58,7 @@ def px4_parameters(calibration: SensorCalibration) -> tuple[str, list[str]]:
         values[f"CAL_ACC0_{axis}OFF"] = offsets[i, 0]
         values[f"CAL_ACC0_{axis}SCALE"] = 1 / gains[i]
     if is_warmed := _is_warmed(calibration):
-        low, high = calibration.ranges[KNOWN["temperature"]]
+        low, high = calibration.ranges[DEVICE_COLUMNS["temperature"]]
         values |= {"TC_A0_TREF": REFERENCE_TEMPERATURE, "TC_A0_TMIN": low, "TC_A0_TMAX": high}
         for i, powers in enumerate(offsets):
             values |= {f"TC_A0_X{k}_{i}": x if k else 0.0 for k, x in enumerate(powers)}
@@ -85,7 +85,7 @@ def _positional(value: float) -> str:
 
 def _is_warmed(calibration: SensorCalibration) -> bool:
     """Whether the temperature matters, and varied."""
-    low, high = calibration.ranges.get(KNOWN["temperature"], (0.0, 0.0))
+    low, high = calibration.ranges.get(DEVICE_COLUMNS["temperature"], (0.0, 0.0))
     return high > low and "temperature" in calibration.model.hold_columns
 
 

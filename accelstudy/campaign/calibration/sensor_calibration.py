@@ -29,9 +29,9 @@ Array = NDArray[np.float64]
 
 RANGE_MARGIN = 0.1
 """Part of the width of a range by which a log may leave it without a warning."""
-FORCES = {"fx_mps2": "forward", "fy_mps2": "right", "fz_mps2": "down"}
+FORCE_RANGES = {"fx_mps2": "forward", "fy_mps2": "right", "fz_mps2": "down"}
 """Ranges of the calibrated forces, and where they point."""
-KNOWN = {name: COLUMNS[name].keys[0] for name in ("temperature", "time", "vibration")}
+DEVICE_COLUMNS = {name: COLUMNS[name].keys[0] for name in ("temperature", "time", "vibration")}
 """Columns of `HoldConditions` that a device has, and the ranges of a calibration in them."""
 LEVELS = 5
 """Number of values of a condition that matters."""
@@ -129,7 +129,7 @@ class SensorCalibration:
 
     def check_device(self) -> None:
         """Raise `InputError` if an effect needs a column that no device knows."""
-        for effect, column in unknown(self.model):
+        for effect, column in unknown_to_devices(self.model):
             what = "position before" if column.startswith("step_") else column
             raise InputError(
                 f"{effect} depends on the {what}, which no device knows; calibrate without it"
@@ -153,13 +153,13 @@ class SensorCalibration:
             (n k, 3) array, each force with each of k conditions, and these.
         """
         levels = []
-        for column, name in KNOWN.items():
+        for column, name in DEVICE_COLUMNS.items():
             usual = REFERENCE_TEMPERATURE if column == "temperature" else 0.0
             low, high = self.ranges.get(name, (usual, usual))
             levels.append(np.linspace(low, high, LEVELS if column in columns else 1))
         grid = np.stack(np.meshgrid(*levels, indexing="ij"), axis=-1).reshape(-1, len(levels))
         each, forces = np.repeat(grid, len(forces), axis=0).T, np.tile(forces, (len(grid), 1))
-        conditions: dict[str, Any] = dict(zip(KNOWN, each, strict=True))
+        conditions: dict[str, Any] = dict(zip(DEVICE_COLUMNS, each, strict=True))
         course = TemperatureCourse(np.zeros(1), np.full(1, REFERENCE_TEMPERATURE))
         return forces, HoldConditions(**conditions, course=course).with_steps(0 * forces)
 
@@ -264,6 +264,6 @@ def calibration_of(content: Any) -> SensorCalibration:
     return SensorCalibration.of(document, CalibrationDocument.refusal())
 
 
-def unknown(model: SensorModel) -> list[tuple[str, str]]:
+def unknown_to_devices(model: SensorModel) -> list[tuple[str, str]]:
     """Effects that need a column that no device knows, each with it."""
-    return [(effect, column) for effect, column in model.needs if column not in KNOWN]
+    return [(effect, column) for effect, column in model.needs if column not in DEVICE_COLUMNS]

@@ -25,7 +25,7 @@ from accelstudy.campaign.calibration.document import calibration_document
 from accelstudy.campaign.calibration.file_format import CalibrationDocument
 from accelstudy.campaign.calibration.fit import campaign_estimability
 from accelstudy.campaign.calibration.result import Calibration
-from accelstudy.campaign.calibration.sensor_calibration import unknown
+from accelstudy.campaign.calibration.sensor_calibration import unknown_to_devices
 from accelstudy.diagnosis.decision.statement import Part
 from accelstudy.diagnosis.file_format import DiagnosisDocument
 from accelstudy.diagnosis.report import words
@@ -333,7 +333,7 @@ class Diagnosis(Result):
             return steps
         use = "Level a log with the calibration that is beside this page"
         steps.append((use, suggestions.apply(result)))
-        if not unknown(d.extended_model.without_rig):
+        if not unknown_to_devices(d.extended_model.without_rig):
             steps.append(("Take it to a device", suggestions.export("c", result)))
         if d.extended_model is not d.model:
             command = suggestions.calibrate("CAMPAIGN", place / "model.yaml", d.base.approach.name)
