@@ -149,8 +149,11 @@ class Log:
 
     def _contradicted_rate(self) -> list[str]:
         """Say that a column of time tells another rate than the one that was given."""
-        raw, rate, said = self.raw, self.layout.rate, []
-        for place in time_columns(raw) if rate is not None else ():
+        raw, rate = self.raw, self.layout.rate
+        if rate is None:
+            return []
+        said = []
+        for place in time_columns(raw):
             unit = "ns" if place in raw.dates else unit_in(raw.names[place], "time")
             times = raw.nanoseconds(place) if place in raw.dates else raw.numbers(place)
             step = UNITS["s"][unit or "s"] * np.median(np.diff(_counted_from_first(times)[0]))
