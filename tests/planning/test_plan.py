@@ -7,7 +7,6 @@ import re
 from dataclasses import replace
 
 import numpy as np
-import pandas as pd
 import pytest
 import yaml
 from calling import call, succeed
@@ -22,7 +21,6 @@ from accelstudy.design.spaces import Attitudes
 from accelstudy.planning import candidates as known
 from accelstudy.planning.answer import CalibrationKind, answer
 from accelstudy.planning.candidates import candidates, information_of, tilt_of
-from accelstudy.planning.plan import PlanDocument
 from accelstudy.planning.question import Equipment, Question
 from accelstudy.planning.reasons import errors_in_use, limits, spoilers
 from accelstudy.planning.simulated import cell_of
@@ -361,23 +359,6 @@ def test_temperature_in_use_leaves_what_warmed_sensors_do(name, tilt_range, kelv
 
 
 # --- the command ---------------------------------------------------------------------------------
-
-ASKED = ("plan", "--tilt-accuracy", "20mgon", "--sigma", "2mm/s2", "--replicates", "200")
-
-
-def test_the_command_writes_what_it_says(tmp_path):
-    out = tmp_path / "plan"
-    said = succeed(*ASKED, "--equipment", "gravity", "--out", out, "--angle-unit", "deg").stdout
-    assert said.startswith("Measure ")
-    names = {path.name for path in out.iterdir()}
-    assert names == {"plan.json", "positions.yaml", "plan.svg", "plan.png"}
-    plan = PlanDocument.read(out).model_dump()
-    table = pd.DataFrame(plan["calibrations"])
-    top = table[table["rank"] == 1].iloc[0]
-    assert top["roll_rms_simulated_mgon"] <= 20
-    assert (table["roll_rms_mgon"] <= 20.5).all()
-    assert plan["seed"] == 1
-    assert get_scheme(str(out / "positions.yaml")).n_positions == top["n_positions"]
 
 
 def test_an_unreachable_target_has_an_exit_status_of_its_own():

@@ -1,8 +1,6 @@
 """Logs and studies in memory: tables in and out, and no file between."""
 
 import json
-import pickle
-import tempfile
 
 import numpy as np
 import pandas as pd
@@ -48,17 +46,6 @@ def test_a_table_that_is_leveled_keeps_its_index_and_columns(calibration, table)
     other = calibration.apply(log)
     assert list(other.columns[:4]) == [0, 1, 2, "note"]
     np.testing.assert_array_equal(other["roll_gon"], leveled["roll_gon"])
-
-
-def test_a_table_in_memory_goes_through_no_file(calibration, table, tmp_path, monkeypatch):
-    monkeypatch.setattr(tempfile, "tempdir", str(tmp_path / "none"))
-    with pytest.raises(FileNotFoundError):
-        tempfile.mkdtemp()
-    monkeypatch.chdir(tmp_path)
-    log = acs.read_log(table)
-    assert len(calibration.apply(log)) == len(table)
-    assert len(calibration.apply(pickle.loads(pickle.dumps(log)))) == len(table)
-    assert not [*tmp_path.iterdir()]
 
 
 @pytest.mark.parametrize("ending", ["csv", "parquet"])

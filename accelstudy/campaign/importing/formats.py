@@ -93,7 +93,8 @@ def table_in_memory(frame: pd.DataFrame) -> RawTable:
     if isinstance(index, pd.DatetimeIndex | pd.TimedeltaIndex) and name not in map(str, frame):
         times = index.total_seconds() if isinstance(index, pd.TimedeltaIndex) else index
         columns, layout = columns.assign(**{name: times}), {"time": name}
-    mixed = columns.select_dtypes(object).columns  # a word between numbers, as files may have, too
+    # A word between numbers, as files may have, too.
+    mixed = [name for name, kind in columns.dtypes.items() if pd.api.types.is_object_dtype(kind)]
     columns = columns.assign(**{name: columns[name].astype(str) for name in mixed})
     try:
         content = pa.Table.from_pandas(columns.rename(columns=str), preserve_index=False)
