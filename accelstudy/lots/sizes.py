@@ -20,6 +20,7 @@ from collections.abc import Sequence
 from contextlib import suppress
 from dataclasses import dataclass
 from functools import cached_property
+from operator import attrgetter
 from typing import NamedTuple
 
 import numpy as np
@@ -199,10 +200,11 @@ class LotResiduals:
         """
         starts, none = [(x, told.pooled / x) for x in SHARES], np.full_like(odd, -np.inf)
         # If sizes differ much, each sensor looks odd beside their mean.
-        without = (self._search(told, none, max(SCATTERS), *start) for start in starts)
+        without = [self._search(told, none, max(SCATTERS), *start) for start in starts]
         starts += [(one.share, one.mean) for one in without]
+        likelihood = attrgetter("log_likelihood")
         return [
-            max((self._search(told, odd, τ, *start) for start in starts), key=_log_likelihood)
+            max((self._search(told, odd, τ, *start) for start in starts), key=likelihood)
             for τ in SCATTERS
         ]
 
@@ -217,8 +219,7 @@ class LotResiduals:
         scatter : float, τ
         share, mean : ρ and μ to begin with
         """
-        _, normal, right, *_ = told
-        k = right.shape[1]
+        normal, right, k = told.normal, told.right, told.right.shape[1]
         nothing, before = self.noise_density(self.squares)[0], -np.inf
         for _ in range(MAX_STEPS):
             variance = scatter**2 * float(np.mean(mean**2))
@@ -242,10 +243,6 @@ class LotResiduals:
             mean = _solved(whole, weights @ pulled)
             share = float(np.clip(has[1].sum() / max(has[:2].sum(), 1e-300), 0.01, 0.999))
         return TypicalSize(odds, before, _cost_of_fitting(k, mean @ whole @ mean), mean, share)
-
-
-def _log_likelihood(size: TypicalSize) -> float:
-    return size.log_likelihood
 
 
 def _solved(normal: Array, right: Array) -> Array:
