@@ -95,7 +95,7 @@ def table_in_memory(frame: pd.DataFrame) -> RawTable:
         columns, layout = columns.assign(**{name: times}), {"time": name}
     # A word between numbers, as files may have, too.
     mixed = [name for name, kind in columns.dtypes.items() if pd.api.types.is_object_dtype(kind)]
-    columns = columns.assign(**{name: columns[name].astype(str) for name in mixed})
+    columns = columns.astype(dict.fromkeys(mixed, str))
     try:
         content = pa.Table.from_pandas(columns.rename(columns=str), preserve_index=False)
     except (TypeError, ValueError, NotImplementedError) as error:
