@@ -141,10 +141,9 @@ def shapes_of(place: Place, frame: SessionFit) -> Iterator[LearnedFunction]:
             for length in lengths:
                 yield _shape({**words, **within, "target": target, "length": length})
     if place == ("time", "bias"):
-        column = _course(frame)
         for cycles in CYCLES:
-            period = np.ptp(frame.hold.column(column)) / cycles
-            yield _shape({"coordinate": f"{column} wave", "target": of, "period": period})
+            period = np.ptp(frame.hold.column(frame.course)) / cycles
+            yield _shape({"coordinate": f"{frame.course} wave", "target": of, "period": period})
 
 
 def _coordinates(coordinate: str, frame: SessionFit) -> Iterator[dict[str, str | float]]:
@@ -155,14 +154,9 @@ def _coordinates(coordinate: str, frame: SessionFit) -> Iterator[dict[str, str |
         for lag in LAGS if between > 0 else ():
             yield {"coordinate": "temperature rate", "tau": float(f"{lag * between:.4g}")}
     elif coordinate == "time":
-        yield {"coordinate": _course(frame)}
+        yield {"coordinate": frame.course}
     elif coordinate in (*UNITS, *ANGLES):
         yield {"coordinate": coordinate}
-
-
-def _course(frame: SessionFit) -> str:
-    """Column of the time, or of the order where there is none."""
-    return "order" if frame.hold.time is None else "time"
 
 
 def _range(effect: LearnedFunction, frame: SessionFit) -> dict[str, float]:

@@ -113,8 +113,7 @@ def _panels(diagnosis: CampaignDiagnosis, positions: pd.DataFrame, count: int) -
     columns = {name: one.to_numpy()[:, None] for name, one in varying.items()}
     # What is missing shows over the coordinate that has it.
     coordinate = diagnosis.like[0].coordinate if diagnosis.like else "force"
-    # Without times that of the time is the order.
-    shown = "order" if coordinate == "time" and frame.hold.time is None else coordinate
+    shown = frame.course if coordinate == "time" else coordinate
     if shown not in ("force", *recorded):
         columns[shown] = coordinate_in_holds(coordinate, frame)
     for name, values in columns.items():

@@ -82,6 +82,11 @@ class SessionFit:
         """Columns that would tell what changes slowly, and that the campaign lacks."""
         return tuple(n for n in ("temperature", "time") if getattr(self.hold, n) is None)
 
+    @property
+    def course(self) -> str:
+        """Column of the time, or of the order where there is none."""
+        return "order" if self.hold.time is None else "time"
+
     @cached_property
     def _columns(self) -> HoldColumns:
         """Columns of the holds beside arrays of settings and parameters."""

@@ -197,7 +197,6 @@ def coordinate_in_holds(name: str, frame: SessionFit) -> Array:
 def _coordinates(frame: SessionFit) -> Iterator[_Coordinate]:
     """Coordinates of a session that vary."""
     hold, f, angles = frame.hold, frame.sensed, frame.angles
-    order = "order" if hold.time is None else "time"
 
     def smooth(name: str, targets: tuple[str, ...], values: Array) -> Iterator[_Coordinate]:
         if np.ptp(values, axis=0).max() > 0:
@@ -213,9 +212,9 @@ def _coordinates(frame: SessionFit) -> Iterator[_Coordinate]:
         yield from smooth("vibration", ANY_TARGET, hold.vibration[:, None])
     if hold.temperature is not None:
         yield from smooth("temperature", ANY_TARGET, hold.temperature[:, None])
-    if getattr(hold, order) is None or np.ptp(hold.column(order)) == 0:
+    if getattr(hold, frame.course) is None or np.ptp(hold.column(frame.course)) == 0:
         return
-    when = hold.column(order)
+    when = hold.column(frame.course)
     yield from smooth("time", ANY_TARGET, when[:, None])
     yield _Coordinate("time", ("bias",), when[:, None], *_waves(when))
     before = np.concatenate([f[:1], f[:-1]])
