@@ -21,7 +21,7 @@ from scipy.linalg import block_diag
 
 from accelstudy.diagnosis.rules import RULES
 from accelstudy.diagnosis.space.frame import HoldColumns, SessionFit
-from accelstudy.diagnosis.space.hypotheses import Shapes, Spaces
+from accelstudy.diagnosis.space.hypotheses import Shapes, Spaces, log_sum
 from accelstudy.effects.learned import TARGETS, added_by
 from accelstudy.effects.smooth import (
     CYCLES,
@@ -155,9 +155,7 @@ class LearnedShapes(Shapes):
         """Log density of residuals (..., m) under the shapes of each place, times its prior."""
         logs = self.logs(evidence, errors) + np.log(self.prior)
         of_place = {p: [q == p for q in self.places] for p in dict.fromkeys(self.places)}
-        return {
-            place: np.logaddexp.reduce(logs[..., some], axis=-1) for place, some in of_place.items()
-        }
+        return {place: log_sum(logs[..., some]) for place, some in of_place.items()}
 
 
 # --- coordinates --------------------------------------------------------------------------------
