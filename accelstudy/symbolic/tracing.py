@@ -33,7 +33,7 @@ class _Symbolic:
 
     def __getattr__(self, name: str) -> Any:
         if name not in self._names:
-            raise AttributeError(name)
+            raise AttributeError(f"xp has no {name!r}; it has {', '.join(sorted(self._names))}")
         return getattr(sp, self._names[name])
 
 

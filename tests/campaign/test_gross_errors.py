@@ -156,6 +156,21 @@ def test_degrees_for_gon_show_at_small_tilts(designs):
     assert found.reason == "the robot's angles are in degrees"
 
 
+def test_degrees_for_gon_show_on_a_base_that_is_not_level():
+    right = acs.simulate_campaign(
+        scheme="fibonacci-30", yaw="random", effects="base_tilt", size=2.0, seed=4
+    )
+    assert recognise(right) is None
+    assert recognise(gross.unit(right, angle=0.9)).reason == "the robot's angles are in degrees"
+
+
+def test_a_wrong_sign_of_an_axis_may_be_that_of_the_robots_angle(designs):
+    right = designs["plain"]
+    for angle, signs in {"pitch": (1, -1), "roll": (-1, 1)}.items():
+        found = recognise(right.with_arrays(angles=right.angles * signs))
+        assert f"or the robot's {angle} has the other sign" in found.reason
+
+
 COUNTS = {
     "scales and offsets": ([0.005, 0.0065, 0.0055], [2600.0, 1500.0, 2010.0]),
     "scales": ([0.003, 0.006, 0.0045], [0.0, 0.0, 0.0]),

@@ -12,8 +12,10 @@ from log_helpers import BIAS, HAND_RATE, HOLD, HOLDS, MOVE, SCALE, by_hand, foun
 from recorded import EPOCH, message, ulog, write_bag, write_ulog
 
 import accelstudy as acs
+from accelstudy.basics.units import GON
 from accelstudy.basics.units import STANDARD_GRAVITY as G
 from accelstudy.campaign.importing.formats import read_table
+from accelstudy.leveling.angles import angles_of
 
 TIME, FORCES = by_hand()
 N = len(TIME)
@@ -382,3 +384,18 @@ def test_short_files_of_one_position_each_are_taken_whole(tmp_path, rate):
     assert campaign.positions.tolist() == [1, 2, 3, *range(5, HOLDS + 1)]
     np.testing.assert_allclose(campaign.forces, np.delete(means, 3, axis=0), atol=1e-9)
     assert campaign.time is None
+
+
+def test_a_table_of_means_is_told_with_what_it_lacks(tmp_path):
+    """Exact names count before letters that mean an axis, too."""
+    means = FORCES.reshape(HOLDS, -1, 3)[:, 50:].mean(axis=1)
+    columns = dict(zip(("fx", "fy", "fz", "x", "y", "z"), (*means.T, *means.T), strict=True))
+    frame = pd.DataFrame({"t": 6e4 * np.arange(HOLDS), **columns, "roll": 0.0, "pitch": 0.0})
+    frame[["roll", "pitch"]] = angles_of(means) / GON
+    campaign = acs.find_holds(frame, means=True, time="t", robot_sigma="3 mgon", frame="frd")
+    assert "forces in m/s^2, angles in gon, axes frd; not used: x, y, z" in said(campaign)
+    assert "without the robot's yaw" in said(campaign)
+    assert "h apart on average; is `time_unit` s right?" in said(campaign)
+    frame = frame.assign(t=20 * np.arange(HOLDS), yaw=0.0)
+    campaign = acs.find_holds(frame, means=True, time="t", robot_sigma="3 mgon")
+    assert campaign.warnings == ()

@@ -68,6 +68,7 @@ def arm_table():
     forces = -9.80665 * np.column_stack(down) * [1, -1, -1] * 1.001
     table = pd.DataFrame(forces + rng.normal(0, 0.002, forces.shape), columns=["fx", "fy", "fz"])
     angles = {"time": 20.0 * np.arange(20), "roll": roll, "pitch": -pitch}
+    angles["yaw"] = rng.uniform(-170, 170, 20)
     return table.assign(**angles).round(6)
 
 

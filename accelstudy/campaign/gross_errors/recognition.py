@@ -51,6 +51,8 @@ MAX_AXIS_RATIO = 2.0
 distance of any axes."""
 MAX_EXCHANGED = 1000
 """Largest number of rows that are reordered; if more do not fit, their order is not the cause."""
+MIN_ANGLE_UNIT_RATIO = 2.0
+"""How many times better the robot's angles must fit in another unit."""
 MIN_SHIFTED_SHARE = 0.5
 """Share of the exchanged rows that belong one row further, above which the table has slipped."""
 MIN_POSITIONS_PER_OUTLIER = 8
@@ -253,6 +255,9 @@ def _is_clear(before: RealSensor, after: RealSensor) -> bool:
     correction = after.undone[-1]
     if correction.left_out or (not before.attitude and correction.name == "axis_error"):
         return True  # the hypothesis itself has compared
+    if correction.name == "unit_error" and correction.matrix is None:
+        # Few units are left to try, and a base that is not level stays in the misfit.
+        return before.misfit > MIN_ANGLE_UNIT_RATIO * after.misfit
     if correction.changed is None:
         # Single positions may be wrong as well: it is enough that most others fit then.
         gained = before.misfit > MIN_RATIO * after.misfit
@@ -350,8 +355,12 @@ def _axes_in_words(matrix: Array) -> str:
         for axis, other, sign in zip("xyz", order, signs, strict=True)
         if sign < 0 or axis != "xyz"[other]
     )
-    wrong = "have the wrong sign" if (order == range(3)).all() else "are swapped"
-    return f"axes {wrong}: {words}"
+    if not (order == range(3)).all():
+        return f"axes are swapped: {words}"
+    # The force of another attitude, in which the robot's angle has the other sign.
+    angle = {(-1, 1, 1): "pitch", (1, -1, 1): "roll"}.get(tuple(signs.astype(int)))
+    other = f", or the robot's {angle} has the other sign" if angle else ""
+    return f"axes have the wrong sign: {words}{other}"
 
 
 def units(sensor: RealSensor, angle_unit: str = "gon") -> Iterator[Correction]:

@@ -243,6 +243,8 @@ def unit_in(name: str, key: str) -> str | None:
 
 def places_by_name(names: Sequence[str], key: str) -> list[int]:
     """Places of the columns that may be the one of a key: one, if the names tell it."""
+    if names.count(key) == 1:
+        return [names.index(key)]
     found: list[int] = []
     for pattern in filter(None, (_USUAL.get(key), _LESS_USUAL.get(key))):
         matches = re.compile(pattern).fullmatch

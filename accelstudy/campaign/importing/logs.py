@@ -14,6 +14,7 @@ from accelstudy.basics.arguments import tidy
 from accelstudy.basics.bounds import SIGMA_FORCE
 from accelstudy.basics.errors import InputError
 from accelstudy.basics.units import MGON, UNITS, display_unit, to_display
+from accelstudy.basics.wording import short_list
 from accelstudy.campaign.gross_errors.recognition import check_plausible, check_size
 from accelstudy.campaign.header import LogLayout
 from accelstudy.campaign.importing.columns import ANGLES, MEANS, SDS, thermometers
@@ -35,6 +36,8 @@ MAX_ACROSS_RATIO = 1.5
 """Noise across gravity, as a multiple of that along it, from which on a warning says that the
 sensor turns within its holds."""
 _YEARS = 1e8  # s; no session lasts for years, so later times count from 1970
+LONGEST_STEP = 3600.0
+"""s between the rows of a table of means, on average, from which on its unit of time is doubted."""
 _ON_EARTH = 9.76, 9.84
 """Gravity, m/s², with some room: from the highest mountain on the equator to the poles."""
 MIN_ROUNDING_RATIO = 0.1
@@ -171,10 +174,33 @@ def _campaign_of_means(log: Log, settings: ImportSettings) -> Campaign:
         "sensor_noise": None if sigma is None else {"sigma_mps2": sigma},
         "robot": None if robot is None else {"angle_sigma_mgon": tidy(robot / MGON)},
     }
+    if robot is not None and "yaw" not in angles:
+        warnings.append(
+            "without the robot's yaw a base that is not level looks like noise; a column yaw, or "
+            "`columns` yaw=NAME, tells it"
+        )
+    if "time" in rows and (step := float(np.ptp(rows["time"])) / len(rows)) > LONGEST_STEP:
+        warnings.append(
+            f"the rows are {step / 3600:.3g} h apart on average; is `time_unit` "
+            f"{log.layout.time_unit} right?"
+        )
     told = "unknown" if sigma is None else sigma_text(sigma)
-    notes = (f"{len(rows)} positions; sigma of a mean: {told}",)
+    notes = (_columns_note(log, settings), f"{len(rows)} positions; sigma of a mean: {told}")
     campaign = Campaign.of(header, forces=log.forces, **columns)
     return _checked(replace(campaign, notes=notes, warnings=tuple(warnings)), log, settings)
+
+
+def _columns_note(log: Log, settings: ImportSettings) -> str:
+    """Say what a table of means was taken for."""
+    names = [name if log.raw.named else f"column {name}" for name in log.raw.names]
+    used = {key: names[place] for key, place in log.places.items()}
+    taken = [key if key == name else f"{key} from {name}" for key, name in used.items()]
+    unused = [name for place, name in enumerate(names) if place not in log.places.values()]
+    angles = f", angles in {settings.robot_unit}" if settings.robot_sigma is not None else ""
+    return (
+        f"columns: {', '.join(taken)}; forces in {log.layout.unit}{angles}, axes {log.layout.frame}"
+        + (f"; not used: {short_list(unused)}" if unused else "")
+    )
 
 
 # --- The campaign of holds -----------------------------------------------------------------------
