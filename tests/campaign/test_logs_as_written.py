@@ -218,6 +218,14 @@ def test_a_rate_that_the_times_contradict_is_told():
         assert "samples per second, and" not in said(right)
 
 
+def test_samples_that_a_regular_clock_skipped_are_counted():
+    lost = np.random.default_rng(2).choice(N, 40, replace=False)
+    assert "40 samples of a regular clock missing" in said(found(table().drop(index=lost)))
+    jitter = np.random.default_rng(3).normal(0, 0.2 / HAND_RATE, N)
+    for time in (TIME, TIME + jitter):
+        assert "missing" not in said(found(table(np.sort(time))))
+
+
 def test_gravity_is_told_and_is_that_of_the_earth():
     usual, typed = acs.find_holds(table()), acs.find_holds(table(), gravity=9.08795)
     assert "gravity: 9.80665 m/s², as none was given" in usual.notes

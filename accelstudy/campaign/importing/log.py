@@ -47,6 +47,8 @@ GAP_RATIO = 5.0
 MAX_RATE_ERROR = 0.05
 """Relative difference between a given rate and that of a column of time, from which on it is
 told."""
+MAX_JITTER = 0.05
+"""Mean deviation of the steps from whole periods, in periods, up to which a log is regular."""
 _USUAL_RATE = 100.0
 """1/s; of several units of time the likely one gives the rate nearest to it."""
 
@@ -227,6 +229,17 @@ class Log:
             if len(without) == len(kept):
                 return mean
             kept = without
+
+    @property
+    def missing(self) -> int:
+        """Samples that a regular log skipped, other than in gaps; 0 of one whose steps jitter."""
+        if "time" not in self.places:
+            return 0
+        steps = np.diff(self.time)
+        periods = steps[steps <= GAP_RATIO * self.step] / np.median(steps)
+        whole = np.round(periods)
+        regular = np.mean(np.abs(periods - whole)) < MAX_JITTER
+        return int(np.sum(whole[whole > 1] - 1)) if regular else 0
 
     def unit_hint(self) -> str:
         """Hint at the unit of time that would give a usual rate; empty if the rate is usual."""
