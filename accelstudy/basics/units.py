@@ -235,6 +235,8 @@ class InputQuantity:
         InputError
             If it is no such quantity, or out of bounds. Only 0 needs no unit.
         """
+        if re.match(r"\s*[+-]?\d*,\d", text):
+            raise InputError(f"{brief(text)}: write a decimal point: {text.replace(',', '.', 1)}")
         match = _QUANTITY.fullmatch(text)
         known = UNITS.get(self.unit, {self.unit: 1.0})
         first = next(iter(known))
@@ -243,8 +245,6 @@ class InputQuantity:
             ends = _ends(self.least, self.most)
             like = f", as 2{first}" if self.unit != "1" else ends and f" of{ends}"
             raise InputError(f"expected {number}{like}, not {brief(text)}")
-        if re.match(r",\d", match[2]):
-            raise InputError(f"{brief(text)}: write a decimal point: {text.replace(',', '.', 1)}")
         name = match[2] or (self.unit if self.bare else first)
         for spelling, plain in _SPELLINGS.items():
             name = name.replace(spelling, plain)
