@@ -4,7 +4,6 @@ import math
 
 import numpy as np
 import pytest
-from calling import refused
 from hypothesis import given
 from hypothesis import strategies as st
 
@@ -88,8 +87,3 @@ def test_angles_in_degrees_are_for_people_only():
 ])  # fmt: skip
 def test_a_number_with_its_unit_is_read(text, unit, expected):
     assert InputQuantity(unit, -math.inf).read(text) == pytest.approx(expected, rel=1e-14)
-
-
-def test_a_decimal_comma_is_refused_with_the_number_as_it_would_be_right():
-    with refused("write a decimal point: 9.80795 m/s^2"):
-        InputQuantity("m/s^2").read("9,80795 m/s^2")

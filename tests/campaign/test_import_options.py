@@ -44,12 +44,6 @@ def test_times_since_1970(tmp_path, turned, unit, kind):
     assert 1 / log.step == pytest.approx(RATE, rel=1e-4)
 
 
-def test_the_unit_of_time_is_suggested(turned):
-    time = SINCE_1970["us"] + 10_000 * np.arange(len(turned[0]))
-    with refused("if its times are in us, there are 100 samples per second", "give `time_unit` us"):
-        acs.find_holds(table(turned[0], time=time))
-
-
 def test_the_rate_is_that_of_the_samples(tmp_path, turned):
     """Most steps are a tick too long, some much too short, and there is a gap."""
     forces, _ = turned
