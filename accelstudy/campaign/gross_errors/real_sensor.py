@@ -34,6 +34,8 @@ MIN_DISTANCE = 1e-6
 """Distance, as a share of gravity, below which differences do not count."""
 MIN_SPARE_POSITIONS = 3
 """Positions beyond the number of fitted parameters that are needed to notice a wrong one."""
+MANY_POSITIONS = 3
+"""Positions, in numbers of fitted parameters, from which on there are many."""
 MAX_ITERATIONS = 40
 """Largest number of iterations."""
 MIN_GROSS_ERROR = 0.1
@@ -152,6 +154,12 @@ class RealSensor:
         """Whether there are enough positions to say which of them are wrong."""
         n, u = self._design[0].shape
         return n >= u + MIN_SPARE_POSITIONS
+
+    @property
+    def has_many(self) -> bool:
+        """Whether there are so many positions that chance hardly makes them fit better."""
+        n, u = self._design[0].shape
+        return n >= MANY_POSITIONS * u
 
     @property
     def usual_distance(self) -> float:

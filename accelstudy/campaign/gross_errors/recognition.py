@@ -52,7 +52,7 @@ distance of any axes."""
 MAX_EXCHANGED = 1000
 """Largest number of rows that are reordered; if more do not fit, their order is not the cause."""
 MIN_ANGLE_UNIT_RATIO = 2.0
-"""How many times better the robot's angles must fit in another unit."""
+"""How many times better the robot's angles must fit in another unit, by many positions."""
 MIN_SHIFTED_SHARE = 0.5
 """Share of the exchanged rows that belong one row further, above which the table has slipped."""
 MIN_POSITIONS_PER_OUTLIER = 8
@@ -257,7 +257,8 @@ def _is_clear(before: RealSensor, after: RealSensor) -> bool:
         return True  # the hypothesis itself has compared
     if correction.name == "unit_error" and correction.matrix is None:
         # Few units are left to try, and a base that is not level stays in the misfit.
-        return before.misfit > MIN_ANGLE_UNIT_RATIO * after.misfit
+        least = MIN_ANGLE_UNIT_RATIO if before.has_many else MIN_RATIO
+        return before.misfit > least * after.misfit
     if correction.changed is None:
         # Single positions may be wrong as well: it is enough that most others fit then.
         gained = before.misfit > MIN_RATIO * after.misfit
@@ -367,8 +368,9 @@ def units(sensor: RealSensor, angle_unit: str = "gon") -> Iterator[Correction]:
     """Convert the forces, or the angles, as if they were in another unit."""
     if sensor.is_far_off:
         yield from _force_units(sensor.campaign)
-    # Degrees for gon are only a tenth off.
-    if sensor.expected is not None and sensor.distance.max() >= MIN_POSITION_ERROR * sensor.gravity:
+    # Degrees for gon are only a tenth off, which many positions show all the same.
+    seen = sensor.has_many and sensor.distance.max() >= MIN_POSITION_ERROR * sensor.gravity
+    if sensor.expected is not None and (sensor.is_far_off or seen):
         yield from _angle_units(sensor.campaign, angle_unit)
 
 
