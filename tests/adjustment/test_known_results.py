@@ -175,7 +175,7 @@ def test_ctu_residuals(known, n, rms, sigma0):
     there is and ours a little more, and σ̂0 differs by less than 0.5 %.
     """
     outcome = known(f"ctu {n}")
-    assert outcome.imported.startswith(f"{n} positions; sigma of a mean: unknown")
+    assert f"\n{n} positions; sigma of a mean: unknown" in outcome.imported
     assert rms - 0.00005 < outcome.rms / MG < rms + 0.0002
     assert outcome.sigma0 / MG == pytest.approx(sigma0, rel=0.005)
     assert outcome.test is None

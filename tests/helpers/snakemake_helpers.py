@@ -9,8 +9,10 @@ import subprocess
 import sys
 import warnings
 from contextlib import chdir, contextmanager, nullcontext, redirect_stderr, redirect_stdout
+from multiprocessing.connection import wait
 from pathlib import Path
 from tempfile import TemporaryDirectory
+from threading import Lock
 
 import pytest
 from places import ROOT
@@ -37,6 +39,8 @@ IMPORTED = {
 }  # fmt: skip
 FORKED_JOB = str(Path(__file__).with_name("forked_job.py"))
 FORKS.set_forkserver_preload(sorted(IMPORTED))
+LOCK = Lock()
+"""A process that starts asks all others for their exit status, which can be read only once."""
 TARGETS = ("study", "campaigns", "total")
 """Lines of Snakemake's list of jobs that are no jobs."""
 
@@ -52,8 +56,11 @@ def snakemake(folder, *words, environment=ENVIRONMENT):
         given = {"script": os.path.abspath(script), "folder": os.getcwd(),
                  "environment": dict(os.environ), "printed": said.name}  # fmt: skip
         process = FORKS.Process(target=runpy.run_path, args=(FORKED_JOB, given))
-        process.start()
+        with LOCK:
+            process.start()
         with benchmarked(process.pid, job.bench_record) if job.bench_record else nullcontext():
+            wait([process.sentinel])
+        with LOCK:
             process.join()
         if process.exitcode:
             raise subprocess.CalledProcessError(process.exitcode, f"python {script}")
