@@ -20,8 +20,8 @@ from accelstudy.study.compiling import calibrator
 
 Array = NDArray[np.float64]
 
-CHUNK = 10_000
-"""Replicates that are calibrated and stored together; few enough for the cache."""
+CHUNK = 50_000
+"""Replicates that are calibrated and stored together; more would only take memory."""
 _NAME = pa.dictionary(pa.int32(), pa.string())
 ESTIMATES = pa.schema(
     [
