@@ -20,7 +20,7 @@ from accelstudy.study.compiling import calibrator
 
 Array = NDArray[np.float64]
 
-CHUNK = 50_000
+CHUNK = 20_000
 """Replicates that are calibrated and stored together; more would only take memory."""
 _NAME = pa.dictionary(pa.int32(), pa.string())
 ESTIMATES = pa.schema(
