@@ -6,18 +6,21 @@ from collections.abc import Iterable, Sequence
 from typing import NamedTuple
 
 import numpy as np
+import pandas as pd
 from numpy.typing import NDArray
 
 from accelstudy.adjustment.quality import POWER, noncentrality, solve
 from accelstudy.approaches import Approach
 from accelstudy.basics.shares import sigmas_95
+from accelstudy.basics.units import display_unit
+from accelstudy.basics.wording import amount
 from accelstudy.campaign.calibration.fit import fit_campaign
 from accelstudy.campaign.session import Campaign
 from accelstudy.diagnosis.file_format import UpperLimit
 from accelstudy.diagnosis.rules import RULES
 from accelstudy.diagnosis.space.frame import SessionFit
 from accelstudy.diagnosis.space.hypotheses import OUTLIER, Hypothesis, cosines
-from accelstudy.effects import Effect
+from accelstudy.effects import Effect, get_effect
 from accelstudy.schemes import Scheme
 from accelstudy.sensors.sensor import SensorModel
 from accelstudy.simulation.hold_plan import check_needs_no_plan
@@ -163,3 +166,31 @@ def examine_scheme(
     ideal = session(model, np.zeros(model.n_parameters), scheme.directions)
     observed = ideal.observations(noise or Noise())
     return SessionFit.of(solve(model, approach, observed))
+
+
+def visibility_table(frame: SessionFit) -> pd.DataFrame:
+    """Table for people: one row per effect that is not in the model, in the units shown."""
+    rows = []
+    for row in visibilities(frame):
+        effect, seen = get_effect(row.name), row.status == "visible"
+        unit = effect.parameters[0].unit
+        near = ", ".join(f"{name} {cosine:.2f}" for name, cosine in row.confused)
+        rows.append(
+            {
+                "effect": row.name,
+                "part": effect.part,
+                "status": row.status,
+                "MDB": amount(row.mdb, unit) if seen else "–",
+                "MIB": amount(row.mib, unit) if seen else "–",
+                "unit": display_unit(unit) if seen else "",
+                "with": "" if row.easiest is None else settings_text(row.easiest),
+                "confused with": row.reason or near,
+            }
+        )
+    return pd.DataFrame(rows)
+
+
+def settings_text(effect: Effect) -> str:
+    """Settings of an effect as it is written, with their units: ``t=290 s``."""
+    units = {one.name: "" if one.unit == "1" else f" {one.unit}" for one in effect.takes}
+    return ", ".join(f"{name}={value:.4g}{units[name]}" for name, value in effect.settings.items())

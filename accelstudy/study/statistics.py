@@ -185,9 +185,8 @@ def _rows(number: Number, cell: Cell, blocks: Sequence[Block]) -> Array:
     """Numbers of the c calibrations of all blocks that converged, (k, c)."""
     ends = np.cumsum([0, *(block.converged.sum() for block in blocks)])
     for block, start, end in zip(blocks, ends, ends[1:], strict=False):
-        part = number.of_block(cell, block)
-        if not block.converged.all():
-            part = np.compress(block.converged, part, axis=1)
+        values, every = number.of_block(cell, block), block.converged.all()
+        part = values if every else np.compress(block.converged, values, axis=1)
         if block is blocks[0]:
             rows = np.empty((len(part), ends[-1]), part.dtype)
         rows[:, start:end] = part

@@ -17,13 +17,11 @@ from accelstudy.basics.arguments import as_sequence
 from accelstudy.basics.errors import InputError, UnknownNameError
 from accelstudy.basics.plugins import source_of
 from accelstudy.basics.progress import stage, track
-from accelstudy.basics.wording import amount
 from accelstudy.campaign.importing.public import public_data
 from accelstudy.data_sheets.reading import data_sheet_names, get_data_sheet
 from accelstudy.data_sheets.sheet import QUANTITIES
 from accelstudy.design.estimability import estimability
 from accelstudy.diagnosis import visibility
-from accelstudy.diagnosis.space.frame import SessionFit
 from accelstudy.effects import Effect, effect_names, get_effect
 from accelstudy.leveling.angles import angles_of
 from accelstudy.noise_effects import NoiseEffect, get_noise_effect, noise_effect_names
@@ -127,7 +125,7 @@ def visible_effects(
         else:
             by = get_approach(approach or "robot")
             examined = visibility.examine_scheme(get_scheme(scheme), get_model(model), by)
-        table = visibility_table(examined)
+        table = visibility.visibility_table(examined)
     table.attrs["legend"] = (
         "MDB: size of one parameter that a test at 0.1 % detects with a probability of 80 %;"
         "\nMIB: size at which the effect can also be told from the one it is most like;"
@@ -136,34 +134,6 @@ def visible_effects(
         f"\n{units.angle_note()}."
     )
     return table
-
-
-def visibility_table(frame: SessionFit) -> pd.DataFrame:
-    """Table for people: one row per effect that is not in the model, in the units shown."""
-    rows = []
-    for row in visibility.visibilities(frame):
-        effect, seen = get_effect(row.name), row.status == "visible"
-        unit = effect.parameters[0].unit
-        near = ", ".join(f"{name} {cosine:.2f}" for name, cosine in row.confused)
-        rows.append(
-            {
-                "effect": row.name,
-                "part": effect.part,
-                "status": row.status,
-                "MDB": amount(row.mdb, unit) if seen else "–",
-                "MIB": amount(row.mib, unit) if seen else "–",
-                "unit": units.display_unit(unit) if seen else "",
-                "with": "" if row.easiest is None else settings_text(row.easiest),
-                "confused with": row.reason or near,
-            }
-        )
-    return pd.DataFrame(rows)
-
-
-def settings_text(effect: Effect) -> str:
-    """Settings of an effect as it is written, with their units: ``t=290 s``."""
-    units = {one.name: "" if one.unit == "1" else f" {one.unit}" for one in effect.takes}
-    return ", ".join(f"{name}={value:.4g}{units[name]}" for name, value in effect.settings.items())
 
 
 def scheme_table(names: Sequence[str], model: str, approach: str) -> pd.DataFrame:

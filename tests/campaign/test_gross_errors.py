@@ -141,8 +141,8 @@ def test_roll_and_pitch_are_exchanged_in_the_axes_of_the_log(designs):
     right = designs["plain"]
     for frame, sign in {"frd": 1, "flu": -1, "rfu": 1}.items():
         log = LogLayout(columns={"fx": 0, "fy": 1, "fz": 2}, frame=frame)
-        angles = sign * right.angles[:, ::-1]
-        found = recognise(right.with_arrays(angles=angles).with_header(log=log))
+        wrong = right.with_arrays(angles=sign * right.angles[:, ::-1])
+        found = recognise(wrong.with_header(log=log))
         assert found.reason == "roll and pitch of the robot are exchanged"
         np.testing.assert_allclose(found.corrected.angles, right.angles, rtol=1e-9)
 
@@ -152,8 +152,7 @@ def test_degrees_for_gon_show_at_small_tilts(designs):
     right = designs["many"]
     steep = np.abs(right.angles).max(axis=1) > 60 * GON
     right = right.without(dict.fromkeys(right.positions[steep].tolist(), "steep"))
-    found = recognise(gross.unit(right, angle=0.9))
-    assert found.reason == "the robot's angles are in degrees"
+    assert recognise(gross.unit(right, angle=0.9)).reason == "the robot's angles are in degrees"
 
 
 def test_degrees_for_gon_show_on_a_base_that_is_not_level():

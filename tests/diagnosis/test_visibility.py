@@ -5,11 +5,10 @@ import pytest
 from norm_model import SHOWN, nine
 from usual import GRAVITY, NINE, G
 
-from accelstudy.diagnosis.visibility import examine_scheme, visibilities
+from accelstudy.diagnosis.visibility import examine_scheme, visibilities, visibility_table
 from accelstudy.effects import effect_names, effects_without
 from accelstudy.schemes import get_scheme
 from accelstudy.simulation.sessions import Noise
-from accelstudy.verbs.tables import visibility_table
 
 SIGMA = 0.002
 LAMBDA = 17.075
