@@ -147,18 +147,18 @@ def test_roll_and_pitch_are_exchanged_in_the_axes_of_the_log(designs):
         np.testing.assert_allclose(found.corrected.angles, right.angles, rtol=1e-9)
 
 
-def test_degrees_for_gon_show_at_small_tilts(designs):
-    """Biases and scales then explain most of a tenth."""
-    right = designs["many"]
-    steep = np.abs(right.angles).max(axis=1) > 60 * GON
-    right = right.without(dict.fromkeys(right.positions[steep].tolist(), "steep"))
-    assert recognise(gross.unit(right, angle=0.9)).reason == "the robot's angles are in degrees"
+def test_degrees_for_gon_show_at_small_tilts():
+    """Biases and scales then explain most of a tenth; one in five positions may be bumped."""
+    right = acs.simulate_campaign(scheme="fibonacci-150", repeat_first=0, seed=7)
+    steep = right.positions[np.abs(right.angles).max(axis=1) > 60 * GON]
+    wrong = gross.unit(right.without(dict.fromkeys(steep.tolist(), "steep")), angle=0.9)
+    bumps = np.outer(np.arange(wrong.n_positions) % 5 == 2, (3, -12, 8))
+    bumped = recognise(wrong.with_arrays(forces=wrong.forces + bumps)).errors[0]
+    assert recognise(wrong).reason == bumped.reason == "the robot's angles are in degrees"
 
 
 def test_degrees_for_gon_show_on_a_base_that_is_not_level():
-    right = acs.simulate_campaign(
-        scheme="fibonacci-30", yaw="random", effects="base_tilt", size=2.0, seed=4
-    )
+    right = acs.simulate_campaign(scheme="fibonacci-30", yaw="random", effects="base_tilt", size=2)
     assert recognise(right) is None
     assert recognise(gross.unit(right, angle=0.9)).reason == "the robot's angles are in degrees"
 

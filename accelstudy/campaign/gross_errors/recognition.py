@@ -7,7 +7,7 @@ a function that yields its corrections.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Collection, Iterator
 from dataclasses import dataclass, replace
 from functools import partial
 from itertools import chain, permutations, product
@@ -255,13 +255,12 @@ def _is_clear(before: RealSensor, after: RealSensor) -> bool:
     correction = after.undone[-1]
     if correction.left_out or (not before.attitude and correction.name == "axis_error"):
         return True  # the hypothesis itself has compared
-    if correction.name == "unit_error" and correction.matrix is None:
-        # Few units are left to try, and a base that is not level stays in the misfit.
-        least = MIN_ANGLE_UNIT_RATIO if before.has_many else MIN_RATIO
-        return before.misfit > least * after.misfit
     if correction.changed is None:
+        # Few units of angles can be meant, and a base that is not level stays in the misfit.
+        of_angles = correction.name == "unit_error" and correction.matrix is None
+        least = MIN_ANGLE_UNIT_RATIO if of_angles and before.has_many else MIN_RATIO
         # Single positions may be wrong as well: it is enough that most others fit then.
-        gained = before.misfit > MIN_RATIO * after.misfit
+        gained = before.misfit > least * after.misfit
         return bool(gained or before.usual_distance > MIN_RATIO * after.usual_distance)
     was, now = (np.median(sensor.distance[correction.changed]) for sensor in (before, after))
     usual, least = MIN_RATIO**2 * after.usual_distance, MIN_POSITION_ERROR * before.gravity
@@ -375,13 +374,12 @@ def units(sensor: RealSensor, angle_unit: str = "gon") -> Iterator[Correction]:
 
 
 def _force_units(campaign: Campaign) -> Iterator[Correction]:
+    """Convert the forces to a unit in which they are about as large as gravity."""
     norm = usual_norm(campaign.forces) / campaign.gravity
     own = campaign.header.unit if campaign.header.unit in SENSOR_UNITS else "m/s^2"
-    sizes = UNITS["m/s^2"]
     for stated in (own, "g" if own == "m/s^2" else "m/s^2"):
-        for unit in SENSOR_UNITS:
-            factor = sizes[unit] / sizes[stated]
-            if unit != stated and RIGHT_UNIT < factor * norm < 1 / RIGHT_UNIT:
+        for unit, factor in _factors(SENSOR_UNITS, "m/s^2", stated).items():
+            if RIGHT_UNIT < factor * norm < 1 / RIGHT_UNIT:
                 instead = "" if stated == "m/s^2" else f", not in {stated}"
                 matrix = factor * np.eye(3)
                 reason = f"the forces are in {unit}{instead}"
@@ -389,13 +387,18 @@ def _force_units(campaign: Campaign) -> Iterator[Correction]:
 
 
 def _angle_units(campaign: Campaign, angle_unit: str) -> Iterator[Correction]:
-    turns, angles = UNITS["rad"], {"angles": campaign.angles, "yaw": campaign.yaw}
-    for unit, name in ROBOT_UNITS.items():
-        if unit != angle_unit:
-            factor = turns[unit] / turns[angle_unit]
-            scaled = {k: None if a is None else factor * a for k, a in angles.items()}
-            reason = f"the robot's angles are in {name}"
-            yield Correction("unit_error", reason, campaign.with_arrays(**scaled))
+    """Convert the robot's angles to each other unit."""
+    angles = {"angles": campaign.angles, "yaw": campaign.yaw}
+    for unit, factor in _factors(ROBOT_UNITS, "rad", angle_unit).items():
+        scaled = {k: None if a is None else factor * a for k, a in angles.items()}
+        reason = f"the robot's angles are in {ROBOT_UNITS[unit]}"
+        yield Correction("unit_error", reason, campaign.with_arrays(**scaled))
+
+
+def _factors(units: Collection[str], si: str, stated: str) -> dict[str, float]:
+    """Factors that mend numbers in the unit that was stated, by the other units of a quantity."""
+    sizes = UNITS[si]
+    return {unit: sizes[unit] / sizes[stated] for unit in units if unit != stated}
 
 
 def rows(sensor: RealSensor) -> Iterator[Correction]:
