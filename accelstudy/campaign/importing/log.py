@@ -105,6 +105,17 @@ class Log:
         return tuple(key for key in self.places if key in CONDITIONS)
 
     @property
+    def used(self) -> dict[str, str]:
+        """Labels of the columns that are read, by their keys, such as "fx"."""
+        return {key: self.raw.labels[place] for key, place in self.places.items()}
+
+    @property
+    def unused(self) -> list[str]:
+        """Labels of the other columns."""
+        used = {*self.places.values()}
+        return [label for place, label in enumerate(self.raw.labels) if place not in used]
+
+    @property
     def forces(self) -> Array:
         """Forces of the samples, (n, 3), m/s²; each axis in one piece."""
         return forces_of(self.samples)
@@ -157,8 +168,8 @@ class Log:
         said = []
         for place in time_columns(raw):
             unit = "ns" if place in raw.dates else unit_in(raw.names[place], "time")
-            times = raw.nanoseconds(place) if place in raw.dates else raw.numbers(place)
-            step = UNITS["s"][unit or "s"] * np.median(np.diff(_counted_from_first(times)[0]))
+            times, _ = _counted_from_first(_ticks(raw, place))
+            step = UNITS["s"][unit or "s"] * np.median(np.diff(times))
             if unit and step > 0 and abs(step * rate - 1) > MAX_RATE_ERROR:
                 said.append(
                     f"column {raw.names[place]} tells {1 / step:.6g} samples per second, and "
@@ -230,9 +241,9 @@ class Log:
                 return mean
             kept = without
 
-    @property
+    @cached_property
     def missing(self) -> int:
-        """Samples that a regular log skipped, other than in gaps; 0 of one whose steps jitter."""
+        """Number of samples that a regular log skipped between gaps; 0 if its steps jitter."""
         if "time" not in self.places:
             return 0
         steps = np.diff(self.time)
@@ -326,8 +337,7 @@ def _convert(
     start, columns, count = np.nan, ["time", *AXES, *conditions], len(raw.content)
     values = np.empty((len(columns), count))
     if "time" in places:
-        read = raw.nanoseconds if places["time"] in raw.dates else raw.numbers
-        time, start = _counted_from_first(read(places["time"]))
+        time, start = _counted_from_first(_ticks(raw, places["time"]))
         factor = _time_factor(raw, layout, places)
         time = _usable(time) * factor
         if "nanoseconds" in places:
@@ -352,6 +362,11 @@ def _convert(
         condition[:] = _usable(raw.numbers(places[key]))
     pa.default_memory_pool().release_unused()
     return pd.DataFrame(values.T, columns=columns, copy=False), start
+
+
+def _ticks(raw: RawTable, place: int) -> NDArray[Any]:
+    """Times of a column, (n,), in its unit; dates in ns since 1970."""
+    return raw.nanoseconds(place) if place in raw.dates else raw.numbers(place)
 
 
 def _time_factor(raw: RawTable, layout: LogLayout, places: Mapping[str, int]) -> float:

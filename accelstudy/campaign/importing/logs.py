@@ -15,7 +15,7 @@ from accelstudy.basics.bounds import SIGMA_FORCE
 from accelstudy.basics.errors import InputError
 from accelstudy.basics.units import MGON, UNITS, display_unit, to_display
 from accelstudy.basics.wording import short_list
-from accelstudy.campaign.gross_errors.recognition import check_plausible, check_size
+from accelstudy.campaign.gross_errors.recognition import check_plausible
 from accelstudy.campaign.header import LogLayout
 from accelstudy.campaign.importing.columns import ANGLES, MEANS, SDS, thermometers
 from accelstudy.campaign.importing.holds import Holds, find_blocks, find_holds
@@ -192,14 +192,11 @@ def _campaign_of_means(log: Log, settings: ImportSettings) -> Campaign:
 
 def _columns_note(log: Log, settings: ImportSettings) -> str:
     """Say what a table of means was taken for."""
-    names = [name if log.raw.named else f"column {name}" for name in log.raw.names]
-    used = {key: names[place] for key, place in log.places.items()}
-    taken = [key if key == name else f"{key} from {name}" for key, name in used.items()]
-    unused = [name for place, name in enumerate(names) if place not in log.places.values()]
+    taken = [key if key == name else f"{key} from {name}" for key, name in log.used.items()]
     angles = f", angles in {settings.robot_unit}" if settings.robot_sigma is not None else ""
     return (
         f"columns: {', '.join(taken)}; forces in {log.layout.unit}{angles}, axes {log.layout.frame}"
-        + (f"; not used: {short_list(unused)}" if unused else "")
+        + (f"; not used: {short_list(log.unused)}" if log.unused else "")
     )
 
 
@@ -227,9 +224,6 @@ def _campaign_of_holds(
         angles_for = reference.angles_for(holds, offset, settings.gravity)
         holds, columns["angles"], sensor, note = angles_for
     table, noise = holds.table, holds.noise
-    # Before a header refuses the noise of such forces.
-    where, forces = f"{log.path}", holds.means - offset
-    check_size(where, forces, settings.gravity, layout.unit, layout.conversion)
     rounded = noise.rounding > MIN_ROUNDING_RATIO * noise.accuracy.allan
     if log.has_one_clock and ("time" in log.places or holds.size is None):
         columns["time"] = ((table["t0"] + table["t1"]) / 2).to_numpy()
@@ -237,15 +231,16 @@ def _campaign_of_holds(
     columns |= {name: table[name].to_numpy() for name in known}
     stated = {"sigma_mps2": noise.sigma, "degrees_of_freedom": max(1.0, float(round(noise.dof)))}
     header = _header(log, settings, layout) | {
-        # Readings that never change within a hold do not show their noise.
-        "sensor_noise": stated if noise.sigma >= SIGMA_FORCE.least else None,
+        # Readings that never change within a hold do not show their noise, and those in a wrong
+        # unit are refused by their size.
+        "sensor_noise": stated if SIGMA_FORCE.least <= noise.sigma <= SIGMA_FORCE.most else None,
         "resolution_mps2": holds.windows.steps.tolist() if rounded else None,
         "reference": sensor,
     }
     campaign = Campaign.of(
         header,
         positions=table.index.to_numpy(),
-        forces=forces,
+        forces=holds.means - offset,
         n_samples=table["n"].to_numpy(),
         sd=table[[*SDS]].to_numpy(),
         **columns,
@@ -307,16 +302,14 @@ def _lines(*given: Any, **more: Any) -> tuple[str, ...]:
 def _notes(holds: Holds, layout: LogLayout, reference: str, rounded: bool) -> tuple[str, ...]:
     """How a log was read, and what was found in it, a line each."""
     log = holds.log
-    raw, places, time = log.raw, log.places, log.time[holds.windows.about]
-    names = [name if raw.named else f"column {name}" for name in raw.names]
+    time = log.time[holds.windows.about]
     return _lines(
         "notes",
         holds,
         log,
         layout=layout,
-        used={"time": "", "temperature": ""} | {key: names[i] for key, i in places.items()},
-        unused=[name for place, name in enumerate(names) if place not in places.values()],
-        heat=[names[place] for place in thermometers(raw.names)],
+        used={"time": "", "temperature": ""} | log.used,
+        heat=[log.raw.labels[place] for place in thermometers(log.raw.names)],
         reference=reference,
         seconds=time[-1] - time[0],
         steps=steps_text(holds.windows.steps) if rounded else "",

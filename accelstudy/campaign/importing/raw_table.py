@@ -65,6 +65,11 @@ class RawTable:
         """Names of the columns; their places, counted from 0, where the file has no names."""
         return [printable(" ".join(name.split())) for name in self.content.column_names]
 
+    @property
+    def labels(self) -> list[str]:
+        """Names of the columns as sentences have them."""
+        return self.names if self.named else [f"column {name}" for name in self.names]
+
     @cached_property
     def dates(self) -> set[int]:
         """Places of columns of dates with times, or of times of a day."""
