@@ -39,6 +39,8 @@ Array = NDArray[np.float64]
 SATURATED_SHARE = 0.999
 """A reading beyond this part of the sensor's range is saturated: the last count is often below the
 range."""
+MANY_SIGMAS = 2.2
+"""Number of sigmas that hold 95 % with 12 degrees of freedom; 2 hold 93 % or more beyond."""
 ROWS = 2**16
 """Rows that are processed together, so that memory does not grow with the log."""
 NEAR_POLE = "near_pole"
@@ -215,6 +217,7 @@ class Leveling:
             reason=self._reason(int(np.argmax(lost))) if lost.any() else "",
             near=self.added[NEAR_POLE].sum(),
             vertical=np.pi / 2,
+            many=MANY_SIGMAS,
             after=self._rows_after_drifts(),
             beyond=[*self._beyond_ranges()],
         )
