@@ -6,8 +6,8 @@
 `golden_parts.py` makes the texts of each part, which are kept as tests/golden/PART/NAME.txt.
 
 Words must be the same, and so must whole numbers. Other numbers may differ by 1e-7 of their size,
-or by anything where both are at most 1e-8, which is rounding of zero, or, printed with 6 to 9
-digits, by one in the last digit. A number printed with fewer digits must be the same: another
+by 1e-10, by anything where both are at most 1e-8, which is rounding of zero, or, printed with 6 to
+9 digits, by one in the last digit. A number printed with fewer digits must be the same: another
 processor changes most numbers by 1e-12 or so, and of a million numbers of five digits hardly one
 lies so near to the middle between two. Renewing leaves a line that agrees as it was kept.
 """
@@ -28,7 +28,7 @@ from places import DATA, ROOT
 from transcript import FORK, import_all
 
 GOLDEN = ROOT / "tests" / "golden"
-RELATIVE, ZERO, DIGITS = 1e-7, 1e-8, 6
+RELATIVE, ABSOLUTE, ZERO, DIGITS = 1e-7, 1e-10, 1e-8, 6
 SHOWN = 20
 """Differences of a file that are shown one by one."""
 NUMBER = re.compile(r"(?<![\w.])[-−+]?\d+(?:\.\d+)?(?:[eE][-+]?\d+)?")
@@ -52,7 +52,7 @@ def same_number(one, other):
     if WHOLE.fullmatch(one) and WHOLE.fullmatch(other):
         return False
     off, size = abs(value(one) - value(other)), max(abs(value(one)), abs(value(other)))
-    if off <= RELATIVE * size or size <= ZERO:
+    if off <= max(RELATIVE * size, ABSOLUTE) or size <= ZERO:
         return True
     digits, unit = max(last_digit(one), last_digit(other))
     return digits >= DIGITS and off <= 1.001 * unit
