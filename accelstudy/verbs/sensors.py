@@ -47,7 +47,8 @@ def compare(
     Raises
     ------
     InputError
-        If they are of different models, or their readings were converted differently.
+        If they are of different models, or their readings were converted differently, or both are
+        one file.
 
     Examples
     --------
@@ -56,6 +57,7 @@ def compare(
     from accelstudy.campaign.calibration.sensor_calibration import sensor_of
     from accelstudy.epochs.history import History
 
+    check_once((first, second), "calibration")
     # The range is in SI by `verb`.
     return History((sensor_of(first, "first"), sensor_of(second, "second")), (), float(tilt_range))
 

@@ -1,10 +1,10 @@
 # What every workflow starts with; it is included after `configfile`.
 import os
 import re
+import sys
 from contextlib import contextmanager
 from operator import attrgetter
 
-from snakemake.exceptions import WorkflowError
 from snakemake.utils import min_version
 
 from accelstudy.basics.errors import InputError
@@ -31,11 +31,13 @@ onerror:
 
 @contextmanager
 def in_a_line():
-    """Say what is wrong with the input in one line."""
+    """End with one line on what is wrong with the input, and exit status 2, as the commands do."""
     try:
         yield
     except InputError as error:
-        raise WorkflowError(str(error)) from None
+        # Snakemake would print an error of its own with a traceback.
+        print(f"error: {error}", file=sys.stderr)
+        sys.exit(2)
 
 
 # Unit of angles on pages, where the configuration names none.
