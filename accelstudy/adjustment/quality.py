@@ -271,10 +271,10 @@ class GlobalTest(NamedTuple):
     @property
     def powerless(self) -> bool:
         """Whether the test has next to no power."""
-        return bool(self.lacking)
+        return bool(self.shortage)
 
     @property
-    def lacking(self) -> str:
+    def shortage(self) -> str:
         """What the test lacks to reject: redundancy, or degrees of freedom of sigma; else empty."""
         if self.dof <= NO_POWER:
             return f"redundancy {self.dof}"
@@ -284,7 +284,7 @@ class GlobalTest(NamedTuple):
     @property
     def remark(self) -> str:
         """Why the test has no power, in words; empty if it has."""
-        return f"{self.lacking}: the test has next to no power" if self.powerless else ""
+        return f"{self.shortage}: the test has next to no power" if self.powerless else ""
 
 
 def global_test(

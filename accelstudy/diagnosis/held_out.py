@@ -198,7 +198,7 @@ def _refit(part: Problem, chosen: Sequence[Cause], place: Place | None) -> Solut
 
 def _place_of(part: Problem) -> Place | None:
     """Place that a part chooses for something unknown, alone or beside effects."""
-    alone = [one for one in part.alone if one.names == (UNKNOWN,)]
+    alone = [one for one in part.single_explanations if one.names == (UNKNOWN,)]
     if not alone:
         return None
     found = most_probable_place(part, Posterior.of([*alone, *part.with_unknown]))

@@ -111,7 +111,7 @@ class Sensor:
         tails = evidence_of(tail_test(problem.residuals, problem.chance).p_value)
         noises = {AXES: axes, COLOUR: colour, TAILS: tails}
         logs |= {name: float(np.logaddexp.reduce(by_level)) + log for name, log in noises.items()}
-        known = problem.base.level.known if self.noise is None else self.noise.said
+        known = problem.base.level.known if self.noise is None else self.noise.stated
         if known:  # what is not stated cannot be wrong
             doubted = Level((1.0,), (RULES.freedom_doubted,), known=True)
             evidence = Evidence(doubted, problem.residuals.redundancy)

@@ -103,13 +103,14 @@ class LotDiagnosis:
         """Names of what the model lacks for each sensor, and their posterior."""
         having = {one.names[0]: one.having for one in self.effects}
         odd, states = {one.campaign for one in self.last.odd}, list[SensorState]()
-        for i, (one, alone) in enumerate(zip(self.evidence, self.last.alone.tolist(), strict=True)):
+        posterior_odd = self.last.posterior_odd.tolist()
+        for i, (one, own) in enumerate(zip(self.evidence, posterior_odd, strict=True)):
             names = [name for name, p in having.items() if p[i] > MIN_HAVING]
             sure = math.prod(max(p[i], 1 - p[i]) for p in having.values())
             if one.campaign in odd:
-                states.append(SensorState(one.campaign, (*names, ODD), sure * alone))
+                states.append(SensorState(one.campaign, (*names, ODD), sure * own))
             else:
-                states.append(SensorState(one.campaign, tuple(names), sure * (1 - alone)))
+                states.append(SensorState(one.campaign, tuple(names), sure * (1 - own)))
         return states
 
 

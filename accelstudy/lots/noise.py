@@ -55,12 +55,12 @@ class NoisePrior:
     ----------
     sigma : float, m/s², of a position mean
     freedom : float, ν: few where sensors differ in noise
-    said : bool, whether its campaign says how large the noise is, which may be wrong then
+    stated : bool, whether its campaign says how large the noise is, which may be wrong then
     """
 
     sigma: float
     freedom: float = RULES.freedom_given
-    said: bool = True
+    stated: bool = True
 
     @property
     def level(self) -> Level:
@@ -117,24 +117,24 @@ def noises_of_lot(
     noises: list[NoisePrior | None] = [None] * n
     fits = {i: one for i in range(n) if (one := fit(i, None)) is not None}
     for source in (STATED, WITHIN, NOTHING):
-        said = {i: u for i, one in fits.items() for by, u in [stated_sigma(one)] if by == source}
-        if len(said) < MIN_SENSORS:
+        own = {i: u for i, one in fits.items() for by, u in [stated_sigma(one)] if by == source}
+        if len(own) < MIN_SENSORS:
             continue
-        group, factor = {i: fits[i] for i in said}, np.inf
+        group, factor = {i: fits[i] for i in own}, np.inf
         # Beside angles the noise of the forces is not in proportion to the residuals, and is
         # searched for: with it the residuals are as large as it says.
         for _ in range(1 + MAX_REFITS):
             sigmas = np.array([one.sigma_posteriori for one in group.values()])
-            ratios = np.maximum(sigmas, LEAST_SIGMA) / [said[i] for i in group]
+            ratios = np.maximum(sigmas, LEAST_SIGMA) / [own[i] for i in group]
             redundancies = np.array([one.solution.redundancy for one in group.values()])
             before, odd_share = factor, 0.0 if source == NOTHING else ODD_SHARE
             factor, freedom = agreement(ratios, redundancies, odd_share)
             beside = any(one.solution.approach.uses_angles for one in group.values())
             if not beside or abs(factor / before - 1) < NOISE_TOLERANCE:
                 break
-            again = {i: fit(i, factor * said[i]) for i in group}
+            again = {i: fit(i, factor * own[i]) for i in group}
             group = {i: one for i, one in again.items() if one is not None}
         if freedom > RULES.freedom_doubted:
-            for i, u in said.items():
-                noises[i] = NoisePrior(factor * u, freedom, said=source != NOTHING)
+            for i, u in own.items():
+                noises[i] = NoisePrior(factor * u, freedom, stated=source != NOTHING)
     return noises

@@ -148,15 +148,15 @@ class Pass:
         An effect has the shape that explains most if it is equally large in all, of those that its
         first campaign tries and of the best one of the campaign that shows it most.
         """
-        told = dict[str, ShownEffect]()
+        shown = dict[str, ShownEffect]()
         for name in sorted({name for one in self.evidence for name in one.shapes}):
             showing = [one for one in self.evidence if name in one.shapes]
             if 2 * len(showing) > sum(one.base is not None for one in self.evidence):
                 most = max(showing, key=lambda one: one.odds[name])
                 shapes = {*showing[0].shapes[name], most.specs[name]}
                 if (best := self.residuals.strongest(sorted(shapes))) is not None:
-                    told[name] = best
-        return told
+                    shown[name] = best
+        return shown
 
     @cached_property
     def classes(self) -> dict[str, tuple[str, ...]]:
@@ -213,14 +213,14 @@ class Pass:
     # --- what is missing --------------------------------------------------------------------
 
     @cached_property
-    def given(self) -> dict[str, float]:
+    def posterior(self) -> dict[str, float]:
         """Posterior of each class to be that of the lot, if anything is wrong, highest first."""
         return {name: p / self.mixture.wrong for name, p in self.mixture.posterior.items()}
 
     @property
     def alternatives(self) -> list[Alternative]:
         """The most probable classes with their posterior, given that anything is wrong."""
-        return [Alternative(self.classes[name], p) for name, p in [*self.given.items()][:3]]
+        return [Alternative(self.classes[name], p) for name, p in [*self.posterior.items()][:3]]
 
     @cached_property
     def found(self) -> LotEffect | None:
@@ -228,8 +228,8 @@ class Pass:
 
         What few sensors have makes these odd.
         """
-        names = [name for name in self.given if name not in self._rare] if self.missing else []
-        sums = np.cumsum([self.given[name] for name in names[:MAX_NAMES]])
+        names = [name for name in self.posterior if name not in self._rare] if self.missing else []
+        sums = np.cumsum([self.posterior[name] for name in names[:MAX_NAMES]])
         count = 1 + int(np.argmax(sums >= MIN_CERTAIN)) if names else 0
         sure = count and sums[count - 1] >= RULES.sure
         return self._effect(names[:count], float(sums[count - 1])) if sure else None
@@ -237,7 +237,7 @@ class Pass:
     @property
     def best(self) -> LotEffect:
         """The most probable effect, however sure."""
-        name, posterior = next(iter(self.given.items()))
+        name, posterior = next(iter(self.posterior.items()))
         return self._effect([name], posterior)
 
     def _effect(self, names: Sequence[str], posterior: float) -> LotEffect:
@@ -258,13 +258,13 @@ class Pass:
     @cached_property
     def _rare(self) -> set[str]:
         """Classes that few sensors have, if the lot has them."""
-        told = self.mixture.effects
-        return {name for name in told if np.sum(told[name].having > MIN_HAVING) <= self._few}
+        effects = self.mixture.effects
+        return {name for name in effects if np.sum(effects[name].having > MIN_HAVING) <= self._few}
 
     # --- which sensors ----------------------------------------------------------------------
 
     @cached_property
-    def alone(self) -> Array:
+    def posterior_odd(self) -> Array:
         """Posterior of each sensor to be odd, (n,).
 
         A sensor is odd by whatever nothing accounts for that is found in the lot. If that makes
@@ -289,12 +289,13 @@ class Pass:
         names = [name for name in self.mixture.own if name not in self._named]
         own = np.array([self.mixture.own[n] + np.log(self.mixture.prior[n]) for n in names])
         # Sensors of which nobody doubts it stay in their order.
-        order = np.argsort(-np.round(self.alone, 3), kind="stable")[: _count_odd(self.alone)]
+        posterior = self.posterior_odd
+        order = np.argsort(-np.round(posterior, 3), kind="stable")[: _count_odd(posterior)]
         return [
             SensorState(
                 self.evidence[i].campaign,
                 self.classes[names[own[:, i].argmax()]],
-                float(self.alone[i]),
+                float(posterior[i]),
             )
             for i in order
         ]

@@ -190,36 +190,36 @@ class LotResiduals:
         shown = float(mean @ mean) / r
         return [float(stats.f.sf(shown * (n - 1) / max(n - shown, 1e-300), r, (n - 1) * r))]
 
-    def typical(self, told: ShownEffect, odd: Array) -> list[TypicalSize]:
+    def typical(self, effect: ShownEffect, odd: Array) -> list[TypicalSize]:
         """Most probable sizes and share of an effect, for each scatter.
 
         Parameters
         ----------
-        told : what sensors tell of the effect
+        effect : what sensors tell of it
         odd : (n,) array, log odds of each sensor to be odd, whose sizes are not those of the type
         """
-        starts, none = [(x, told.pooled / x) for x in SHARES], np.full_like(odd, -np.inf)
+        starts, none = [(x, effect.pooled / x) for x in SHARES], np.full_like(odd, -np.inf)
         # If sizes differ much, each sensor looks odd beside their mean.
-        without = [self._search(told, none, max(SCATTERS), *start) for start in starts]
+        without = [self._search(effect, none, max(SCATTERS), *start) for start in starts]
         starts += [(one.share, one.mean) for one in without]
         likelihood = attrgetter("log_likelihood")
         return [
-            max((self._search(told, odd, τ, *start) for start in starts), key=likelihood)
+            max((self._search(effect, odd, τ, *start) for start in starts), key=likelihood)
             for τ in SCATTERS
         ]
 
     def _search(
-        self, told: ShownEffect, odd: Array, scatter: float, share: float, mean: Array
+        self, effect: ShownEffect, odd: Array, scatter: float, share: float, mean: Array
     ) -> TypicalSize:
         """Search for sizes and share with a scatter, by expectation and maximization.
 
         Parameters
         ----------
-        told, odd : as in `typical`
+        effect, odd : as in `typical`
         scatter : float, τ
         share, mean : ρ and μ to begin with
         """
-        normal, right, k = told.normal, told.right, told.right.shape[1]
+        normal, right, k = effect.normal, effect.right, effect.right.shape[1]
         nothing, before = self.noise_density(self.squares)[0], -np.inf
         for _ in range(MAX_STEPS):
             variance = scatter**2 * float(np.mean(mean**2))

@@ -49,7 +49,7 @@ def write_type(lot: LotCalibration, folder: Path) -> bool:
     # Of what none of the usual sensors has for sure, the campaigns of all tell; the next one may
     # not have it, as of what belongs to a mounting.
     parameters = {
-        name: one if one.told.any() else replace(one, has=one.usual, stays=False)
+        name: one if one.informative.any() else replace(one, has=one.usual, stays=False)
         for name, one in lot.parameters.items()
         if name in wanted
     }

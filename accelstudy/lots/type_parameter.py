@@ -38,14 +38,14 @@ class TypeParameter:
     has: NDArray[np.bool_]
 
     @cached_property
-    def told(self) -> NDArray[np.bool_]:
+    def informative(self) -> NDArray[np.bool_]:
         """Usual sensors that have it, and whose campaigns show it, (n,)."""
         return self.usual & self.has & np.isfinite(self.values) & np.isfinite(self.sigmas)
 
     @cached_property
     def of_type(self) -> RandomEffects:
         """Mean and scatter over these sensors; those of one that is not known if there are none."""
-        values, sigmas = self.values[self.told], self.sigmas[self.told]
+        values, sigmas = self.values[self.informative], self.sigmas[self.informative]
         if not len(values):
             values, sigmas = np.full((2, 1), np.nan)
         return RandomEffects(values, sigmas**2, np.ones((len(values), 1)))
@@ -79,7 +79,7 @@ class TypeParameter:
     def in_all(self) -> bool:
         """Whether the next sensor has it, too: all that are usual and calibrated have it."""
         calibrated = self.usual & np.isfinite(self.values)
-        return self.stays and 1 < np.count_nonzero(self.told) == np.count_nonzero(calibrated)
+        return self.stays and 1 < np.count_nonzero(self.informative) == np.count_nonzero(calibrated)
 
     def draw(self, ax: Axes) -> None:
         """Draw it for each sensor with its interval, the type as a band, and odd sensors."""

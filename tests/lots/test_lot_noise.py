@@ -46,7 +46,7 @@ def assert_sigmas(noises, sigmas, rtol=0.03):
 
 def test_sensors_whose_stated_noise_differs_have_a_factor_in_common():
     noises = noises_of([fit(true, k, stated=2 * true) for k, true in enumerate(MIXED)])
-    assert all(noise.said and noise.freedom >= 60 for noise in noises)
+    assert all(noise.stated and noise.freedom >= 60 for noise in noises)
     assert_sigmas(noises, MIXED)
     # So has what the samples within the holds tell.
     noises = noises_of([fit(true, k, within=true / 3) for k, true in enumerate(MIXED)])
@@ -66,7 +66,7 @@ def test_sensors_that_say_nothing_pool_only_if_they_agree():
     """What is not said cannot be wrong."""
     noises = noises_of([fit(ROUGH, k) for k in range(N)])
     assert_sigmas(noises, ROUGH)
-    assert not any(noise.said for noise in noises)
+    assert not any(noise.stated for noise in noises)
     assert noises_of([fit(true, k) for k, true in enumerate(MIXED)]) == [None] * N
     # Those that say it are judged apart from those that do not.
     half = [fit(true, k, stated=true if k < N / 2 else None) for k, true in enumerate(MIXED)]

@@ -260,7 +260,7 @@ def test_a_sensor_is_odd_though_a_second_one_shows_the_same_by_chance():
 def test_names_between_which_the_lot_does_not_decide_are_reported_as_one_set():
     one = weighed(np.array([[12.0, 12.1, 0.0]] * 12), np.random.default_rng(7))
     assert {*one.found.names} == {*NAMES[:2]}
-    assert one.found.posterior > MIN_CERTAIN > max(one.given.values())
+    assert one.found.posterior > MIN_CERTAIN > max(one.posterior.values())
 
 
 def test_what_imitates_two_effects_gives_way_beside_one_of_them():

@@ -129,7 +129,7 @@ class Leveling:
         if mended is None or mended.matrix is None:
             return False
         option_of = {"unit_error": "unit", "axis_error": "frame"}
-        return option_of.get(mended.error) not in self.log.given
+        return option_of.get(mended.error) not in self.log.settings
 
     @cached_property
     def forces(self) -> Array:
@@ -226,7 +226,7 @@ class Leveling:
     def _reason(self, row: int) -> str:
         """Say why a row is empty, and where it is."""
         needed = {*AXES, "time", *(column for _, column in self.calibration.model.needs)}
-        lost = [key for key in self.log.lacking(row) if key in needed]
+        lost = [key for key in self.log.unreadable(row) if key in needed]
         if lost:
             return self.log.describe(row, lost[0])
         where, _ = self.log.raw.look_up(row, self.log.places["fx"])

@@ -60,7 +60,7 @@ class Log:
     Attributes
     ----------
     raw : RawTable
-    given : mapping, keys of `LogLayout` that were said of it
+    settings : mapping, keys of `LogLayout` that were said of it
     layout : LogLayout, how its numbers are read; what was not said is told from the format and the
         names
     places : mapping, places of the columns of "fx", "fy", "fz" and what else is known
@@ -73,7 +73,7 @@ class Log:
     """
 
     raw: RawTable
-    given: Mapping[str, Any]
+    settings: Mapping[str, Any]
     layout: LogLayout
     places: Mapping[str, int]
     samples: pd.DataFrame
@@ -86,12 +86,12 @@ class Log:
         return self.raw.path
 
     def __repr__(self) -> str:
-        return f"Log({', '.join([repr(self.path.name), *self.given])})"
+        return f"Log({', '.join([repr(self.path.name), *self.settings])})"
 
     def _repr_html_(self) -> str:
         from accelstudy.pages.notebook import notebook_html
 
-        given = pd.DataFrame(self.given.items(), columns=["setting", "value"], dtype=object)
+        given = pd.DataFrame(self.settings.items(), columns=["setting", "value"], dtype=object)
         return notebook_html("Log", self.path.name, given)
 
     @property
@@ -131,7 +131,7 @@ class Log:
         """Which rows lack a force, or the time that they should have, (n,)."""
         return np.isnan(self.samples.iloc[:, :4].to_numpy()).T.any(axis=0)
 
-    def lacking(self, row: int) -> list[str]:
+    def unreadable(self, row: int) -> list[str]:
         """Keys of the readings that a row lacks; axes are those of the log."""
         of_frame = dict(zip(self.layout.axes.order, AXES, strict=True))
         named = {key: of_frame[i] for i, key in enumerate(AXES)}
@@ -141,7 +141,7 @@ class Log:
 
     def describe(self, row: int, key: str | None = None) -> str:
         """Say what stands in a row for "time", "fx", …, by default for the first that it lacks."""
-        key = key or self.lacking(row)[0]
+        key = key or self.unreadable(row)[0]
         where, cell = self.raw.look_up(row, self.places[key])
         return f"{where}, column {self.raw.names[self.places[key]]} ({key}): {cell}"
 
@@ -213,7 +213,7 @@ class Log:
             )
         if lost.sum() > MAX_BAD_SHARE * len(lost):
             row = int(np.argmax(lost))
-            hint = "; give the rate (`rate`) instead" if self.lacking(row)[0] == "time" else ""
+            hint = "; give the rate (`rate`) instead" if self.unreadable(row)[0] == "time" else ""
             raise InputError(
                 f"{self.path}: {self.describe(row)}, not a usable number{hint}; {lost.sum()} of "
                 f"{plural(len(lost), 'row')} lack one, which are too many"
@@ -315,7 +315,7 @@ def read_log(
     InputError
         If it cannot be read.
     """
-    known = log.given if isinstance(log, Log) else {}
+    known = log.settings if isinstance(log, Log) else {}
     usual = None if like is None else like.variable
     given, variable = {**known, **given}, given.get("variable", usual)
     if isinstance(log, pd.DataFrame):

@@ -79,8 +79,8 @@ def import_log(
     settings = settings or ImportSettings()
     _check_kinds(len(logs), settings, reference)
     if settings.means:
-        return _campaign_of_means(read_log(logs[0], settings.said, more=MEANS), settings), None
-    read = [read_log(one, settings.said) for one in logs]
+        return _campaign_of_means(read_log(logs[0], settings.layout, more=MEANS), settings), None
+    read = [read_log(one, settings.layout) for one in logs]
     if len(logs) == 1 and settings.block is None:
         read[0].check_timed()
     joined = join(read)
@@ -144,7 +144,7 @@ def _campaign_of_means(log: Log, settings: ImportSettings) -> Campaign:
     if not len(rows):
         raise InputError(f"{log.path}: no row of numbers")
     for row in np.flatnonzero(rows.isna().any(axis=1)).tolist():
-        key = next(key for key in log.lacking(row) if key in rows)
+        key = next(key for key in log.unreadable(row) if key in rows)
         raise InputError(f"{log.path}: {log.describe(row, key)}, not a usable number")
     columns = {key: rows[key].to_numpy() for key in log.conditions}
     if "time" in rows:

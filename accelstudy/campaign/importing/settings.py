@@ -87,7 +87,7 @@ class ImportSettings(LogLayout):
     )
 
     @property
-    def said(self) -> dict[str, Any]:
+    def layout(self) -> dict[str, Any]:
         """Keys of the layout of the log that were said."""
         fields = {*LogLayout.model_fields}
         return self.model_dump(include=fields, exclude_unset=True, exclude_none=True)

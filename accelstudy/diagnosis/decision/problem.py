@@ -188,15 +188,16 @@ class Problem:
         return weigh_singles(self.frame, self.evidence)
 
     @cached_property
-    def alone(self) -> list[Explanation]:
+    def single_explanations(self) -> list[Explanation]:
         """Explanations by one effect, one outlying position, or something unknown."""
         classes, densities = self.singles.classes, self.singles.densities
         each = -np.log(max(len(classes), 1))
-        alone = [Explanation((one,), densities[one.name] + each) for one in classes]
+        explanations = [Explanation((one,), densities[one.name] + each) for one in classes]
         if self.unknown is not None:
             density = self.unknown.log_density(self.evidence, self.residuals.z)
-            alone.append(Explanation((NOT_LISTED,), float(density + np.log(self.prior_unknown))))
-        return alone
+            weight = float(density + np.log(self.prior_unknown))
+            explanations.append(Explanation((NOT_LISTED,), weight))
+        return explanations
 
     @cached_property
     def sets(self) -> list[Explanation]:
@@ -223,8 +224,9 @@ class Problem:
         weighed = list[Explanation]()
         if len(self.singles.classes) < 2 or self.unknown is None:
             return weighed
-        singles = [one for one in self.alone if one.best]
-        least = max(one.log_weight for one in (*self.alone, *self.sets)) - RULES.sets_within
+        singles = [one for one in self.single_explanations if one.best]
+        weights = [one.log_weight for one in (*self.single_explanations, *self.sets)]
+        least = max(weights) - RULES.sets_within
         pairs = [one for one in self.sets if len(one.best) == 2 and one.log_weight > least]
         pairs.sort(key=lambda one: -one.log_weight)
         prior = float(np.log(RULES.prior_two * self.prior_unknown))
@@ -357,7 +359,8 @@ class Problem:
     @cached_property
     def posterior(self) -> Posterior:
         """Probabilities of everything that may be missing or wrong."""
-        return Posterior.of([*self.alone, *self.sets, *self.with_unknown, *self.noises])
+        by_effects = [*self.single_explanations, *self.sets, *self.with_unknown]
+        return Posterior.of([*by_effects, *self.noises])
 
 
 SEED = np.random.SeedSequence(1)

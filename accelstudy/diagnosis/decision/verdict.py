@@ -149,7 +149,7 @@ def posterior_by_refits(problem: Problem, single: Explanation, count: int) -> Po
     weighed = [one for one, _ in refitted]
     if solution is not None:
         weighed += _pairs_with(problem, alone, solution)
-    others = [one for one in problem.alone if one.names != single.names]
+    others = [one for one in problem.single_explanations if one.names != single.names]
     return Posterior.of([*weighed, *others, *problem.noises])
 
 
