@@ -78,7 +78,7 @@ class Alternative(Part):
 
 
 class Odd(Part):
-    """A sensor with an effect that the others do not have.
+    """A sensor with an effect that the others do not have, or have in another size.
 
     Attributes
     ----------

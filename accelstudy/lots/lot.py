@@ -15,6 +15,8 @@ from functools import cached_property, partial
 from multiprocessing import active_children, get_context
 from typing import TypeAlias
 
+import numpy as np
+
 from accelstudy.approaches import Approach
 from accelstudy.basics.errors import InputError
 from accelstudy.campaign.calibration.fit import usual_approach
@@ -32,6 +34,8 @@ from accelstudy.lots.passes import (
     Mapped,
     Pass,
     SensorState,
+    count_odd,
+    not_odd,
 )
 from accelstudy.sensors.models import compose, composition_name
 from accelstudy.sensors.sensor import SensorModel
@@ -84,14 +88,26 @@ class LotDiagnosis:
         return min(2 * min(one.p_value for one in same), 1.0)
 
     @property
+    def p_value_of_usual(self) -> float:
+        """That of the sensors which are not odd, beside what was found."""
+        return min(2 * self.last.p_value_of_usual, 1.0)
+
+    @property
     def missing(self) -> bool:
         """Whether anything is missing, at one level for the whole lot."""
         return self.p_value < LEVEL
 
     @property
+    def only_odd(self) -> bool:
+        """Whether odd sensors alone show that anything is missing."""
+        return bool(self.odd) and not self.effects and self.p_value_of_usual >= LEVEL
+
+    @property
     def state(self) -> str:
         """State in a word, as the badge of the page has it."""
-        return "no_effect" if not self.missing else "named" if self.effects else "unknown"
+        if not self.missing or self.only_odd:
+            return "no_effect"
+        return "named" if self.effects else "unknown"
 
     @property
     def alternatives(self) -> list[Alternative]:
@@ -99,11 +115,28 @@ class LotDiagnosis:
         return next((one for one in self.passes if one.missing), self.passes[-1]).alternatives
 
     @cached_property
+    def odd(self) -> list[SensorState]:
+        """Odd sensors, the surest first: by what the others lack, or by the size of an effect."""
+        by_size = [
+            SensorState(self.evidence[i].campaign, one.names, float(one.apart[i]))
+            for one in self.effects
+            for i in np.argsort(-one.apart, kind="stable")[: count_odd(one.apart)]
+        ]
+        first = {one.campaign: one for one in (*by_size, *self.last.odd)}
+        return sorted(first.values(), key=lambda one: -round(one.posterior, 3))
+
+    @property
+    def usual(self) -> list[int]:
+        """Numbers of the sensors that are not odd."""
+        return not_odd(self.evidence, self.odd)
+
+    @cached_property
     def each(self) -> list[SensorState]:
         """Names of what the model lacks for each sensor, and their posterior."""
         having = {one.names[0]: one.having for one in self.effects}
-        odd, states = {one.campaign for one in self.last.odd}, list[SensorState]()
-        posterior_odd = self.last.posterior_odd.tolist()
+        odd, states = {one.campaign for one in self.odd}, list[SensorState]()
+        usual = np.prod([1 - self.last.posterior_odd, *(1 - one.apart for one in self.effects)], 0)
+        posterior_odd = (1 - usual).tolist()
         for i, (one, own) in enumerate(zip(self.evidence, posterior_odd, strict=True)):
             names = [name for name, p in having.items() if p[i] > MIN_HAVING]
             sure = math.prod(max(p[i], 1 - p[i]) for p in having.values())

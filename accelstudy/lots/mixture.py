@@ -129,6 +129,11 @@ class Mixture:
         low, high = SHARES[np.minimum(np.searchsorted(np.cumsum(density), [0.025, 0.975]), STEPS)]
         return float(SHARES @ density), float(low), float(high)
 
+    def own_size(self, name: str) -> Array:
+        """Posterior of each sensor to be odd by the size of an effect that the lot has, (n,)."""
+        by_it = np.log(PRIOR_ODD * self.prior[name]) + self.own[name] - self.odd
+        return np.asarray(self.effects[name].odd * np.exp(by_it))
+
     @cached_property
     def sensors(self) -> Array:
         """Posterior of each sensor to have each effect, the most probable first, and to be odd.

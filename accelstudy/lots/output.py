@@ -154,7 +154,7 @@ class Lot(Result):
             "explained": d.explained,
             "close": d.close,
             "alternatives": d.alternatives,
-            "odd": d.last.odd,
+            "odd": d.odd,
             "each": [one._replace(failed=failed.get(one.campaign)) for one in d.each],
             "left_out": [{"campaign": name, "reason": why} for name, why in self.left_out.items()],
             "tilt": self.calibration.tilt,
@@ -167,7 +167,7 @@ class Lot(Result):
         rows = pd.json_normalize(self.content["effects"], "parameters", ["names", "share"])
         columns = ["effect", "share", "name", "mean", "scatter", "sigma", "unit"]
         rows = rows.reindex(columns=["names", *columns[1:]])
-        return rows.assign(names=rows["names"].str.join(" or ")).set_axis(columns, axis=1)
+        return rows.assign(names=rows["names"].map(" or ".join)).set_axis(columns, axis=1)
 
     def to_frame(self) -> pd.DataFrame:
         """Return for each sensor which effects its model lacks, and their posterior probability."""

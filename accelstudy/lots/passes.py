@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from typing import TYPE_CHECKING, Any, NamedTuple, TypeAlias
@@ -66,6 +66,7 @@ class LotEffect(NamedTuple):
     specs : (n,) tuple of str, that of each sensor: what is sudden has a time of its own; empty of
         what is no effect
     having : (n,) array, posterior of each sensor to have it
+    apart : (n,) array, that of having it in another size than the others
     parameters : its sizes, once the sensors are calibrated with it
     """
 
@@ -76,6 +77,7 @@ class LotEffect(NamedTuple):
     spec: str | None
     specs: tuple[str, ...]
     having: Array
+    apart: Array
     parameters: Sequence[TypeParameter] = ()
 
     def is_one_of(self, effects: Sequence[LotEffect]) -> bool:
@@ -245,7 +247,8 @@ class Pass:
         first = names[0]
         members = tuple(member for name in names for member in self.classes[name])
         share, low, high = self.mixture.share(first)
-        having, each = self.mixture.effects[first].having, [one.specs for one in self.evidence]
+        apart, each = self.mixture.own_size(first), [one.specs for one in self.evidence]
+        having = self.mixture.effects[first].having + apart
         most = max(self.evidence, key=lambda one: one.odds.get(first, -np.inf))
         shown = self.shown.get(first)
         spec = most.specs.get(first) if shown is None else shown.spec
@@ -253,7 +256,8 @@ class Pass:
         if spec is not None:
             sudden = get_effect(spec).sudden
             own = tuple(specs.get(first, spec) if sudden else spec for specs in each)
-        return LotEffect(members, min(posterior, 1.0), share, (low, high), spec, own, having)
+        about = members, min(posterior, 1.0), share, (low, high), spec, own
+        return LotEffect(*about, having, apart)
 
     @cached_property
     def _rare(self) -> set[str]:
@@ -274,7 +278,7 @@ class Pass:
         *having, odd = self.mixture.sensors
         each = dict(zip(self.mixture.effects, having, strict=True))
         unnamed = sum((each[name] for name in each if name not in self._named), odd)
-        if _count_odd(unnamed) <= self._few:
+        if count_odd(unnamed) <= self._few:
             return np.asarray(unnamed)
         return np.asarray(sum((each[name] for name in self._rare), odd))
 
@@ -290,7 +294,7 @@ class Pass:
         own = np.array([self.mixture.own[n] + np.log(self.mixture.prior[n]) for n in names])
         # Sensors of which nobody doubts it stay in their order.
         posterior = self.posterior_odd
-        order = np.argsort(-np.round(posterior, 3), kind="stable")[: _count_odd(posterior)]
+        order = np.argsort(-np.round(posterior, 3), kind="stable")[: count_odd(posterior)]
         return [
             SensorState(
                 self.evidence[i].campaign,
@@ -303,11 +307,16 @@ class Pass:
     @property
     def usual(self) -> list[int]:
         """Numbers of the sensors that are not odd."""
-        odd = {one.campaign for one in self.odd}
-        return [i for i, each in enumerate(self.evidence) if each.campaign not in odd]
+        return not_odd(self.evidence, self.odd)
 
 
-def _count_odd(posterior: Array) -> int:
+def not_odd(evidence: Sequence[SensorEvidence], odd: Iterable[SensorState]) -> list[int]:
+    """Numbers of the sensors that are not odd."""
+    campaigns = {one.campaign for one in odd}
+    return [i for i, each in enumerate(evidence) if each.campaign not in campaigns]
+
+
+def count_odd(posterior: Array) -> int:
     """How many sensors are called odd, by the posterior of each, so that few are so wrongly."""
     wrong = np.cumsum(np.sort(1 - posterior)) / np.arange(1, len(posterior) + 1)
     return int(np.sum(wrong <= FALSE_ODD))

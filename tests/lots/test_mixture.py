@@ -181,15 +181,19 @@ def test_a_size_that_is_fitted_costs_what_its_integral_says():
     assert of_type.odds.sum() + of_type.cost == pytest.approx(integral, abs=0.1)
 
 
-def test_an_odd_sensor_has_no_say_in_the_sizes_of_the_type():
+def test_a_size_of_its_own_makes_a_sensor_odd_and_has_no_say_in_those_of_the_type():
     sizes = np.full((N, 3), [1.0, 0.0, 0.0])
     sizes[5] *= 40
     *_, residuals = type_of(np.random.default_rng(7), sizes)
     told = residuals.shown(NAMES[0])
     odd = told.right[:, 0] ** 2 / told.normal[:, 0, 0] / 2 - 10  # by a size of its own
     scale = told.normal[0, 0, 0] / (residuals.frames[0].rows(get_effect(NAMES[0])) ** 2).sum()
-    for of_type in residuals.typical(told, odd)[:2]:
+    typical = residuals.typical(told, odd)
+    for of_type in typical[:2]:
         assert abs(of_type.mean[0]) * np.sqrt(scale) == pytest.approx(1.0, abs=0.2)
+    apart = mixture_of(odd[:, None] + 5, {NAMES[0]: typical}).own_size(NAMES[0])
+    assert np.flatnonzero(apart > 0.1).tolist() == [5]
+    assert apart[5] > 0.99
 
 
 @pytest.mark.parametrize("noise", [1.0, np.geomspace(0.1, 10, N)[:, None]])
@@ -265,7 +269,7 @@ def test_names_between_which_the_lot_does_not_decide_are_reported_as_one_set():
 
 def test_what_imitates_two_effects_gives_way_beside_one_of_them():
     imitator, second, first = (
-        LotEffect((name,), 1.0, 1.0, (0.9, 1.0), name, (), np.ones(1)) for name in NAMES
+        LotEffect((name,), 1.0, 1.0, (0.9, 1.0), name, (), *np.eye(2)) for name in NAMES
     )
     found = {(): imitator, imitator.names: second, second.names: first, first.names: second}
 

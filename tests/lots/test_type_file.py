@@ -45,7 +45,7 @@ def type_of(sensors, folder, effects=()):
     fits = {i: fitted(one) for i, one in enumerate(sensors)}
     named = [SimpleNamespace(noise=NoisePrior(0.002, 200.0)) for _ in sensors]
     lot = SimpleNamespace(
-        last=SimpleNamespace(usual=range(len(sensors)), sensors=named),
+        usual=range(len(sensors)), last=SimpleNamespace(sensors=named),
         each=[SensorState(one.name, (), 1.0) for one in sensors], effects=effects, model=MODEL,
     )  # fmt: skip
     assert write_type(LotCalibration(lot, MODEL, fits, {}), folder)
@@ -126,7 +126,7 @@ def test_each_command_takes_a_type(tmp_path):
 def test_the_next_sensor_need_not_have_what_no_sensor_has_for_sure(tmp_path):
     rng = np.random.default_rng(15)
     made = [measured("mclaren-24", np.zeros(9), rng, f"s{i}") for i in range(5)]
-    scale = LotEffect(("scale",), 0.8, 0.4, (0.1, 0.9), "scale", ("scale",) * 5, np.zeros(5))
+    scale = LotEffect(("scale",), 0.8, 0.4, (0.1, 0.9), "scale", ("scale",) * 5, *np.zeros((2, 5)))
     read = yaml.safe_load(type_of(made, tmp_path, (scale,)).read_text(encoding="utf-8"))
     sure = {name: one["in_all"] for name, one in read["parameters"].items()}
     assert sure == {name: not name.startswith("s_") for name in MODEL.parameter_names}
