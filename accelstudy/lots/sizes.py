@@ -48,6 +48,8 @@ SHARES = (0.9, 0.35)
 """ρ from which the search begins: many sensors have the effect, or few."""
 MAX_STEPS = 60
 """Most steps of the search for μ and ρ."""
+LEAST_HAVING = 1e-12
+"""Probability with which each sensor counts at least among those of the type."""
 LIKELIHOOD_TOLERANCE = 1e-3
 """Change of the log likelihood below which the search ends."""
 
@@ -236,7 +238,7 @@ class LotResiduals:
             before = now
             has = np.exp(logs - total)
             # Weighted least squares, with the noise that the effect leaves in each sensor.
-            weights = has[1] * precision
+            weights = np.maximum(has[1], LEAST_HAVING) * precision
             taken = normal - normal @ spread @ normal  # (N⁻¹ + S)⁻¹
             whole = np.einsum("n,nkl->kl", weights, taken)
             pulled = right - np.einsum("nkl,nlm,nm->nk", normal, spread, right)
