@@ -16,19 +16,24 @@ class Range:
     least, most : float, both allowed
     unit : str, for messages; empty for a count
     zero : bool, whether 0 is allowed as well; it means "none"
+    other : str, a unit in which values are larger by `shift` and often come; empty for none
     """
 
     least: float
     most: float
     unit: str = ""
     zero: bool = False
+    other: str = ""
+    shift: float = 0.0
 
     def check(self, value: float) -> float:
         """Return the value; raise `InputError` with the range if it is outside."""
         if self.least <= value <= self.most or (self.zero and value == 0):
             return value
         ends = f"from {_plain(self.least)} to {_plain(self.most)} {self.unit}".rstrip()
-        raise InputError(f"must be {'0, or ' if self.zero else ''}{ends}, not {_plain(value)}")
+        meant = self.other and self.least <= value - self.shift <= self.most
+        text = f"must be {'0, or ' if self.zero else ''}{ends}, not {_plain(value)}"
+        raise InputError(f"{text}; is it in {self.other}?" if meant else text)
 
     def check_key(self, key: str, value: float) -> None:
         """Check the value of a key, which the error names."""
@@ -54,7 +59,8 @@ SIGMA_READING = Range(1e-9, 1e3, "m/s²", zero=True)
 SIGMA_GRAVITY = Range(1e-9, 1e3, "m/s²", zero=True)
 SIGMA_ANGLE = Range(1e-6, 4e5, "mgon", zero=True)
 ANGLE = Range(-400.0, 400.0, "gon")
-TEMPERATURE = Range(-273.15, 1e4, "°C")
+# The hottest accelerometers work in oil wells, at up to 200 °C; in kelvin none works at so little.
+TEMPERATURE = Range(-273.15, 210.0, "°C", other="kelvin", shift=273.15)
 VIBRATION = Range(0.0, 1e4, "m/s²")
 TIME = Range(-1e12, 1e12, "s")
 INTERVAL = Range(1e-6, 1e6, "s")

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import os
 import re
-from collections.abc import Callable
+from collections import Counter
+from collections.abc import Callable, Sequence
 from errno import ENAMETOOLONG
 from glob import glob, has_magic
 from pathlib import Path
@@ -19,6 +20,14 @@ def path_name(text: str, otherwise: str) -> str:
     """Make the name of a file or folder of any text; `otherwise`, if it has no usable letter."""
     name = re.sub(r"[^\w.-]+", "-", text).lstrip(".-").encode()[:MAX_NAME_BYTES]
     return name.decode(errors="ignore") or otherwise
+
+
+def distinct(names: Sequence[str]) -> list[str]:
+    """Names that differ: where several are one, each has its number among all behind it."""
+    numbered = [f"{name}-{number}" for number, name in enumerate(names, start=1)]
+    several = {name for name, count in Counter(names).items() if count > 1}
+    own = [new if name in several else name for name, new in zip(names, numbered, strict=True)]
+    return own if len({*own}) == len(own) else numbered
 
 
 def check_path_name(name: str) -> str:

@@ -16,7 +16,7 @@ from accelstudy.approaches import Approach
 from accelstudy.basics import suggestions
 from accelstudy.basics.errors import InputError
 from accelstudy.basics.levels import ACCEPTED, BLIND, IMPLAUSIBLE, REJECTED, UNCHECKED
-from accelstudy.basics.names import path_name
+from accelstudy.basics.names import distinct, path_name
 from accelstudy.basics.progress import say, show, track, warn
 from accelstudy.basics.units import MGON, display_unit, to_display
 from accelstudy.basics.wording import one_line, plural
@@ -90,19 +90,18 @@ class Batch(Result):
         Raises
         ------
         InputError
-            If two campaigns have the same name, or none can be calibrated.
+            If none can be calibrated.
         """
         self.name = plural(len(campaigns), "campaign")
         self.sources: dict[str, str] = {}
         self.calibrations: dict[str, Calibration] = {}
         self.failed: dict[str, str] = {}
         self._chosen = {"model": model.name, "approach": approach and approach.name}
-        for given in track(campaigns, "campaigns"):
-            source = given.name if isinstance(given, Campaign) else os.path.normpath(given)
-            name = path_name(Path(os.path.abspath(source)).name, "campaign")
-            if name in self.sources:
-                raise InputError(f"{self.sources[name]} and {source} are both named {name!r}")
-            self.sources[name] = source
+        paths = [one.name if isinstance(one, Campaign) else one for one in campaigns]
+        names = [path_name(Path(os.path.abspath(path)).name, "campaign") for path in paths]
+        self.sources.update(zip(distinct(names), map(os.path.normpath, paths), strict=True))
+        each = zip(track(campaigns, "campaigns"), self.sources.items(), strict=True)
+        for given, (name, source) in each:
             try:
                 campaign = given if isinstance(given, Campaign) else read_campaign(source)
                 fit = fit_campaign(campaign, model, approach)

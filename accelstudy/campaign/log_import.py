@@ -94,7 +94,7 @@ def files_of(given: Iterable[str | PathLike[str]]) -> list[Path]:
         If there is none.
     """
     files: list[Path] = []
-    for path in (path_of("log", one, "a path or a DataFrame") for one in given):
+    for path in (path_of("log", one, "a path, or one DataFrame outside a list") for one in given):
         if path.is_dir() and not (path / BAG_OF_FOLDER).is_file():
             inside = [p for p in path.iterdir() if p.is_file() and not p.name.startswith(".")]
             inside.sort(key=natural)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from datetime import date as calendar_date
 from datetime import datetime
 from functools import cached_property
 from itertools import zip_longest
@@ -352,7 +353,7 @@ def _check_alike(calibrations: Sequence[SensorCalibration]) -> None:
 
 def dates_of(
     calibrations: Sequence[SensorCalibration],
-    dates: Sequence[str | datetime],
+    dates: Sequence[str | calendar_date],
     names: Sequence[str],
 ) -> list[datetime]:
     """Dates of calibrations that are given, or those of the campaigns; two may have none.
@@ -360,7 +361,7 @@ def dates_of(
     Parameters
     ----------
     calibrations : sequence of SensorCalibration
-    dates : sequence of str or datetime, of each calibration; none for those of the campaigns
+    dates : sequence of str or date, of each calibration; none for those of the campaigns
     names : sequence of str, what messages call the calibrations
 
     Raises
@@ -389,7 +390,7 @@ def dates_of(
                 "again with `date` in the header of the campaign"
             )
         try:
-            stated.append(date if isinstance(date, datetime) else read_date(date))
+            stated.append(read_date(date))
         except InputError as error:
             raise InputError(f"{key('dates') if dates else f'{name}: date'}: {error}") from None
     return stated

@@ -15,7 +15,7 @@ from matplotlib.figure import Figure
 from accelstudy.approaches import Approach
 from accelstudy.basics import suggestions
 from accelstudy.basics.errors import InputError
-from accelstudy.basics.names import path_name
+from accelstudy.basics.names import distinct, path_name
 from accelstudy.basics.progress import say, show
 from accelstudy.basics.units import GON
 from accelstudy.basics.wording import probability
@@ -94,9 +94,8 @@ class Lot(Result):
             If fewer than two campaigns can be judged.
         """
         usable, without, first = list[Campaign](), dict[str, str](), dict[bytes, str]()
-        names = [campaign.name for campaign in campaigns]
-        for number, (given, name) in enumerate(zip(campaigns, names, strict=True), start=1):
-            own = name if names.count(name) == 1 else f"{name} ({number})"
+        names = distinct([campaign.name for campaign in campaigns])
+        for given, own in zip(campaigns, names, strict=True):
             campaign = given.with_header(name=own)
             # Noise never repeats: the same numbers are the same log, whatever its folder.
             if (same := first.setdefault(campaign.forces.tobytes(), own)) != own:

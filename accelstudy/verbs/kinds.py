@@ -11,6 +11,7 @@ import math
 import re
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from datetime import date
 from functools import cache, wraps
 from os import PathLike
 from pkgutil import resolve_name
@@ -175,6 +176,7 @@ def angle(least: float, most: float) -> InputQuantity:
 Quantity = float | str
 """A number in SI, or a text with a unit."""
 TEXT = kind_of_types("a text", str)
+DATE = kind_of_types("a date, as 2026-03-01", str, date)
 FLAG = kind_of_types("True or False", bool)
 COLUMN = kind_of_types("the name of a column or its number", str, int, name="column")
 PATH = FilePath(path_of, "path", files=True)

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Sequence
-from datetime import datetime
+from collections.abc import Callable, Sequence
+from datetime import date
 from os import PathLike
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
@@ -66,7 +66,7 @@ def compare(
 def history(
     calibrations: Sequence[Calibration | str | PathLike[str]],
     *,
-    dates: Sequence[str | datetime] = (),
+    dates: Sequence[Annotated[str | date, kinds.DATE]] = (),
     tilt_accuracy: kinds.Accuracy | None = None,
     tilt_range: kinds.Tilt = "50gon",
     confidence: kinds.Share = "95%",
@@ -85,8 +85,9 @@ def history(
     Parameters
     ----------
     calibrations : sequence of Calibration or path
-        calibration.json files of one sensor; three or more for rates and scatter.
-    dates : sequence of str or datetime
+        calibration.json files of one sensor, their folders, or patterns; three or more for rates
+        and scatter.
+    dates : sequence of str or date
         Date of a calibration, as 2026-03-01 or 2026-03-01T14:00; one for each, in their order.
         [default: those of the campaigns]
     tilt_accuracy : float in rad, or str with a unit
@@ -110,8 +111,7 @@ def history(
     from accelstudy.campaign.calibration.sensor_calibration import sensor_of
     from accelstudy.epochs.history import History, dates_of
 
-    calibrations = as_sequence(calibrations)
-    check_once(calibrations, "calibration")
+    calibrations = paths(calibrations, "calibration", os.path.exists)
     sensors = [sensor_of(one) for one in calibrations]
     dated = dates_of(sensors, dates, [*map(str, calibrations)])
     accuracy = None if tilt_accuracy is None else float(tilt_accuracy)  # in SI by `verb`
@@ -156,9 +156,7 @@ def lot(
     from accelstudy.lots.output import Lot
     from accelstudy.verbs.inputs import as_campaign, model_and_approach
 
-    folders = folders_of(campaigns)
-    check_once(folders, "sensor")
-    measured = [as_campaign(one) for one in folders]
+    measured = [as_campaign(one) for one in paths(campaigns, "sensor", os.path.isdir)]
     return Lot.of(measured, *model_and_approach(model, approach), seed, cores)
 
 
@@ -184,7 +182,7 @@ def batch(
     Raises
     ------
     InputError
-        If two campaigns have the same name, none can be calibrated, or a name is unknown.
+        If none can be calibrated, or a name is unknown.
 
     Examples
     --------
@@ -193,15 +191,16 @@ def batch(
     from accelstudy.campaign.batch import Batch
     from accelstudy.verbs.inputs import model_and_approach
 
-    return Batch(folders_of(campaigns), *model_and_approach(model, approach))
+    return Batch(paths(campaigns, "campaign", os.path.isdir), *model_and_approach(model, approach))
 
 
-def folders_of(campaigns: Any) -> list[Any]:
-    """Folders in place of the patterns that they match; anything else stands for itself."""
-    folders: list[Any] = []
-    for one in as_sequence(campaigns):
-        found = matches(Path(one), os.path.isdir) if isinstance(one, str | PathLike) else None
-        if found == []:
-            raise InputError(f"{one}: no folder has such a name")
-        folders += [one] if found is None else map(Path, found)
-    return folders
+def paths(given: Any, what: str, wanted: Callable[[str], bool]) -> list[Any]:
+    """Paths in place of the patterns that they match; anything else stands for itself, once."""
+    each: list[Any] = []
+    for one in as_sequence(given):
+        matching = matches(Path(one), wanted) if isinstance(one, str | PathLike) else None
+        if matching == []:
+            raise InputError(f"{one}: no {what} there")
+        each += [one] if matching is None else map(Path, matching)
+    check_once(each, what)
+    return each

@@ -90,8 +90,9 @@ def test_the_overview(made):
 
 def test_a_batch_in_python(made):
     folder, _ = made
-    batch = acs.batch([folder / "campaigns/plain", simulated_campaign(TRUTH, seed=9)])
-    assert (batch.state, batch.failed) == ("accepted", {})
+    other = simulated_campaign(TRUTH, seed=9).with_header(name="plain")
+    batch = acs.batch([folder / "campaigns/plain", other])
+    assert (batch.state, [*batch.calibrations]) == ("accepted", ["plain-1", "plain-2"])
     assert batch.verdict == "2 of 2 campaigns calibrated"
     assert batch.to_frame()["sigma_source"].tolist() == ["a priori"] * 2
     assert len(batch.parameters) == 18

@@ -120,13 +120,13 @@ def calibrations(folder, biases):
 def test_a_drift_is_found_and_shortens_the_interval(per_year, tmp_path):
     """Calibrations come in any order."""
     paths = list(calibrations(tmp_path, [0.1 + per_year * k / 2 for k in range(5)]))
-    history = acs.history(paths[::-1], dates=YEARS[::-1], tilt_accuracy="60 mgon")
+    dates = np.array(YEARS[::-1], dtype="datetime64[D]").tolist()
+    history = acs.history(paths[::-1], dates=dates, tilt_accuracy="60 mgon")
     history.save(tmp_path / "out")
     content = history.content
     assert history.state == ("changed" if per_year else "unchanged")
-    assert [p["found"] for p in content["parameters"] if p["found"]] == [["drifts"]] * bool(
-        per_year
-    )
+    found = [one["found"] for one in content["parameters"] if one["found"]]
+    assert found == [["drifts"]] * bool(per_year)
     low, high = content["parameters"][0]["rate"]["ci95"]
     assert low < per_year < high
     assert [c["campaign"] for c in content["calibrations"]] == [f"session-{k}" for k in range(1, 6)]

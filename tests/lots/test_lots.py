@@ -79,9 +79,9 @@ def test_the_command_says_what_a_lot_lacks(tmp_path):
     told = succeed("lot", *given, "--seed", 0, "--out", tmp_path / "lot").stdout
     content = json.loads((tmp_path / "lot/lot.json").read_text(encoding="utf-8"))
     left_out = {left["campaign"]: left["reason"] for left in content["left_out"]}
-    assert left_out.keys() == {"few", "sensor-0 (8)"}
+    assert left_out.keys() == {"few", "sensor-0-8"}
     assert "do not determine" in left_out["few"]
-    assert "has the readings of sensor-0 (1)" in left_out["sensor-0 (8)"]
+    assert "has the readings of sensor-0-1" in left_out["sensor-0-8"]
     assert content["sensors"] == N_LOT
     assert content["anything"]["missing"]
     (effect,) = content["effects"]

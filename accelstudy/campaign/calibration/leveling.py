@@ -149,6 +149,7 @@ class Leveling:
                     f"{where}, which no log has; a calibration without this effect can be applied"
                 )
             raise InputError(f"{where}; give it by {OPTIONS[condition]}")
+        self.log.check_units([condition for _, condition in self.calibration.model.needs])
         usable = self.forces[np.isfinite(self.forces).all(axis=1)]
         if not len(usable):
             first = f"; the first: {self._reason(0)}" if len(self.forces) else ""

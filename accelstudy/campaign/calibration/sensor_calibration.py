@@ -12,8 +12,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from accelstudy.basics.arguments import check_type, path_of
-from accelstudy.basics.errors import InputError
+from accelstudy.basics.arguments import path_of
+from accelstudy.basics.errors import InputError, brief
 from accelstudy.campaign.calibration.file_format import CalibrationDocument
 from accelstudy.campaign.columns import COLUMNS
 from accelstudy.campaign.header import LogLayout
@@ -251,11 +251,10 @@ def sensor_of(given: Any, name: str = "calibration") -> SensorCalibration:
     """Return the part of a calibration that belongs to the sensor, by object or path."""
     if isinstance(given, str | PathLike):
         return read_calibration(path_of(name, given))
-    sensor = getattr(given, "sensor", None)
+    if isinstance(sensor := getattr(given, "sensor", None), SensorCalibration):
+        return sensor
     expected = "what `calibrate` or `read_calibration` returns, or a path"
-    check_type(name, sensor, SensorCalibration, expected=expected)
-    assert isinstance(sensor, SensorCalibration)
-    return sensor
+    raise InputError(f"{name}: expected {expected}, not {brief(given)}")
 
 
 def calibration_of(content: Any) -> SensorCalibration:

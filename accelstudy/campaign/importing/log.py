@@ -18,6 +18,7 @@ from accelstudy.basics.arguments import path_of
 from accelstudy.basics.errors import InputError
 from accelstudy.basics.units import CLOCK_UNITS, UNITS
 from accelstudy.basics.wording import plural
+from accelstudy.campaign.columns import COLUMNS
 from accelstudy.campaign.header import LogLayout
 from accelstudy.campaign.importing.columns import (
     AXES,
@@ -145,6 +146,15 @@ class Log:
         where, cell = self.raw.look_up(row, self.places[key])
         return f"{where}, column {self.raw.names[self.places[key]]} ({key}): {cell}"
 
+    def check_units(self, conditions: Collection[str]) -> None:
+        """Raise `InputError` if conditions are such as in another unit, going by the first rows."""
+        for key in [key for key in self.conditions if key in conditions]:
+            usual = float(self.samples[key][:SAMPLED_ROWS].median())
+            if np.isfinite(usual):
+                COLUMNS[key].within.check_key(
+                    f"{self.path}: column {self.used[key]} ({key})", usual
+                )
+
     def warnings(self) -> list[str]:
         """What could not be read."""
         if self.parts:
@@ -206,11 +216,12 @@ class Log:
         samples = self.samples[~lost] if lost.any() else self.samples
         if place is not None and (backward := np.diff(samples["time"]) <= 0).any():
             row = int(samples.index[1 + int(np.argmax(backward))])
-            where, cell = self.raw.look_up(row, place)
-            raise InputError(
-                f"{self.path}: {where}, column {self.raw.names[place]} (time): time does not "
-                f"increase ({cell}); the rate (`rate`) does without it"
-            )
+            moved = np.argsort(samples["time"], kind="stable") - np.arange(len(samples))
+            remedy = "the rate (`rate`) does without it"
+            if np.median(np.abs(moved)) > 1:  # neither jitter nor a wrong time here and there
+                remedy = "sort the rows by time, or, if its clock began anew, give `rate`"
+            where = self.describe(row, "time")
+            raise InputError(f"{self.path}: {where}, not after the row above; {remedy}")
         if lost.sum() > MAX_BAD_SHARE * len(lost):
             row = int(np.argmax(lost))
             hint = "; give the rate (`rate`) instead" if self.unreadable(row)[0] == "time" else ""

@@ -276,7 +276,8 @@ def _header(log: Log, settings: ImportSettings, layout: LogLayout) -> dict[str, 
 
 
 def _checked(campaign: Campaign, log: Log, settings: ImportSettings) -> Campaign:
-    """Refuse forces nowhere near gravity and angles in another unit; add what is doubtful."""
+    """Refuse forces nowhere near gravity and what is in another unit; add what is doubtful."""
+    log.check_units(log.conditions)
     doubts = check_plausible(campaign, f"{log.path}", settings.robot_unit)
     given = "gravity" in settings.model_fields_set
     note = f"gravity: {campaign.gravity:.9g} m/s²{'' if given else ', as none was given'}"
