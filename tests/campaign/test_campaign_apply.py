@@ -245,9 +245,11 @@ def test_a_single_reading_is_as_noisy_as_within_the_holds():
 def test_what_the_calibration_did_not_see_is_counted():
     rows = pd.DataFrame({"fx": 0.1, "fy": [0.1, 12.5, 0.2, 0.1], "fz": -9.8, "temperature": 20.0})
     rows.loc[2:, "temperature"] = [36.0, 60.0]  # the first is within the margin
-    _, (warm, strong) = leveled_rows(calibrated("thermal_bias", {"b_T_x": 2e-3}), rows)
-    assert warm.startswith("temperature outside the range of the calibration in 1 of 4 rows")
-    assert "up to 60 °C" in warm
+    for effect, end in (("thermal_bias", "extrapolated there"), ("cubic_scale", "depends on it")):
+        _, (warm, strong) = leveled_rows(calibrated(effect, {}), rows)
+        assert warm.startswith("temperature outside the range of the calibration in 1 of 4 rows")
+        assert "up to 60 °C" in warm
+        assert warm.endswith(end)
     assert "force outside the range of the calibration in 1 of 4 rows: up to 12.5 m/s² r" in strong
 
 

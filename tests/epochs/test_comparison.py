@@ -3,10 +3,12 @@
 import json
 
 import numpy as np
+import pandas as pd
 from session_helpers import SENSOR, document
 
 from accelstudy.basics.units import GON, MGON
 from accelstudy.basics.units import STANDARD_GRAVITY as G
+from accelstudy.campaign.calibration.leveling import level
 from accelstudy.campaign.calibration.sensor_calibration import calibration_of
 from accelstudy.epochs.history import History
 from accelstudy.files.documents import json_text
@@ -38,3 +40,10 @@ def test_another_gravity_is_said_to_change_the_scales():
     one, other = calibrated(1), calibrated(1, gravity=G * (1 + 200e-6))
     assert "in one place, this alone changes each scale by 200 ppm" in compare(one, other).verdict
     assert "Gravity" not in compare(one, one).verdict
+
+
+def test_a_rejected_calibration_is_not_used_without_a_word():
+    one, other = calibrated(1), calibrated(2, effects=(*SENSOR, "quadratic_scale: 1e-3, 0, 0"))
+    assert "noise allows: session-2. What changed may be" in compare(one, other).verdict
+    log = pd.DataFrame([[0.0, 0, -G]], columns=["fx", "fy", "fz"])
+    assert ["rejected" in " ".join(level(x, log).warnings) for x in (one, other)] == [False, True]

@@ -29,11 +29,8 @@ def drawn(seed, sigmas, *, n=N, rate=0.0, scatter=0.0, dof=STATED):
     for _ in range(n):
         values = 5 + rate * DATES + scatter * rng.standard_normal(6)
         values += sigmas * rng.standard_normal(6)
-        sure = np.isinf(dof)
-        variances = np.where(
-            sure, 1.0, rng.chisquare(np.where(sure, 1.0, dof)) / np.where(sure, 1, dof)
-        )
-        yield ParameterCourse(DATES, values, sigmas**2 * variances, dof)
+        many = np.minimum(dof, 1e9)
+        yield ParameterCourse(DATES, values, sigmas**2 * rng.chisquare(many) / many, dof)
 
 
 def change_of(course):
@@ -60,15 +57,11 @@ def test_what_is_not_there_is_found_no_more_often_than_is_said(sigmas, dof):
 @pytest.mark.parametrize(("sigmas", "scatter"), [(EQUAL, 0.0), (UNEQUAL, 0.5), (UNEQUAL, 5.0)])
 def test_intervals_hold_rate_and_scatter(sigmas, scatter):
     """Without scatter the interval of the rate is wider than it need be: nobody knows."""
-    rates, scatters = zip(
-        *((c.rate.ci95, c.scatter.ci95)
-          for c in drawn(2, sigmas, rate=0.4, scatter=scatter)), strict=True,
-    )  # fmt: skip
-    low, high = np.transpose(scatters)
+    drifting = drawn(2, sigmas, rate=0.4, scatter=scatter)
+    rates, (low, high) = np.moveaxis([(c.rate.ci95, c.scatter.ci95) for c in drifting], 0, -1)
     held = np.mean((low <= scatter) & (scatter <= high))
     assert held == pytest.approx(0.975 if scatter == 0 else 0.95, abs=tolerance(0.05))
-    low, high = np.transpose(rates)
-    held = np.mean((low < 0.4) & (high > 0.4))
+    held = np.mean((rates[0] < 0.4) & (rates[1] > 0.4))
     assert held >= 0.95 - tolerance(0.05)
     if scatter == 5:
         assert held == pytest.approx(0.95, abs=tolerance(0.05))

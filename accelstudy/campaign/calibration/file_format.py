@@ -272,6 +272,12 @@ class Quality(Part):
     variance_components: VarianceComponents | None = None
     tilt_rms_mgon: Tilt | None = None
 
+    @property
+    def misfit(self) -> GlobalTest | None:
+        """The global test if residuals are larger than the stated noise allows, else None."""
+        test = self.global_test
+        return test if test and not test.accepted and test.statistic > test.dof else None
+
 
 class CalibrationDocument(Document):
     """A calibration; `accelstudy apply` and `export` read it.
