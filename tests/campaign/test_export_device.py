@@ -144,7 +144,7 @@ class Library:
 
 LAG, CLIPS, FRAMES = ("thermal_bias(tau=300)",), ("saturation(knee=9)",), ("flu", "rfu")
 TURN = np.array([[0, -1, 0], [1, 0, 0], [0, 0, 1.0]])
-COUNTS = {"scale": [0.002, 0.0021, 0.0019], "offset": [33000.3, 33100.4, 32900.2]}
+COUNTS = {"scale": [5e-5, 4.7e-5, 4.6e-5], "offset": [2**23 + 0.3, 2**23 + 500.4, 2**23 - 900.2]}
 needs_cc = pytest.mark.skipif(shutil.which("cc") is None, reason="there is no C compiler (cc)")
 
 
@@ -222,9 +222,10 @@ def test_c_takes_counts_in_the_axes_of_the_log(frame, single):
     """A large offset costs no digits: the first thing that is done is to take it away."""
     forces, axes = attitudes(30), parse_frame(frame)
     read = readings_of(single.calibrations[frame], forces, HoldConditions()) @ TURN
-    counts = axes.from_frd(read) / COUNTS["scale"] + COUNTS["offset"]
-    force = single(frame, counts, {})
-    np.testing.assert_allclose(force, axes.from_frd(forces), rtol=0, atol=2e-5)
+    counts = np.round(axes.from_frd(read) / COUNTS["scale"] + COUNTS["offset"])
+    exact = axes.to_frd((counts - COUNTS["offset"]) * COUNTS["scale"]) @ TURN.T
+    expected = axes.from_frd(single.calibrations[frame].correct(exact))
+    np.testing.assert_allclose(single(frame, counts, {}), expected, rtol=0, atol=5e-6)
 
 
 @cache

@@ -145,13 +145,20 @@ class _Writer:
     def affine(
         self, name: str, matrix: Array, of: str, offset: Array, constant: Array
     ) -> list[str]:
-        """Write name = matrix (of − offset) + constant, without what is zero."""
-        matrix, offset, constant = (
+        """Write name = matrix (of − offset) + constant, without what is zero.
+
+        Of a large offset, as of counts, what a float holds goes first, which costs no digits.
+        """
+        lines, near = list[str](), offset.astype(np.float32).astype(float)
+        if near.any():
+            entries = [self._text(sp.Symbol(f"{of}[{i}]") - near[i]) for i in range(3)]
+            of, lines = "centred", [f"const accel_real centred[3] = {{{', '.join(entries)}}};"]
+        matrix, constant = (
             sp.Matrix(3, each.size // 3, [int(v) if v in (-1, 0, 1) else v for v in each.ravel()])
-            for each in (matrix, offset, constant)
+            for each in (matrix, constant - matrix @ (offset - near))
         )
         vector = sp.Matrix(symbols(*(f"{of}[{i}]" for i in range(3))))
-        return self.assigned(_entries(name, matrix * (vector - offset) + constant))
+        return lines + self.assigned(_entries(name, matrix * vector + constant))
 
     def _text(self, expression: Any) -> str:
         return str(self._printer.doprint(self._expand(expression)))
