@@ -52,6 +52,11 @@ class Spoiler:
     verdict: str
 
     @property
+    def plain(self) -> str:
+        """The effect in plain words."""
+        return PLAIN[self.effect]
+
+    @property
     def usual_sizes(self) -> tuple[float, float]:
         """Sizes in good and in cheap equipment, SI."""
         return get_effect(self.effect).typical

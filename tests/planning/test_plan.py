@@ -133,9 +133,8 @@ def test_the_answer_is_the_cheapest_that_reaches_the_target(plan):
         c for c in plan.candidates
         if c.equipment == BY_HAND and c.seconds < first.seconds and c.tilt.rms.max() <= 10 * MGON
     ]  # fmt: skip
-    assert all(
-        c.tilt.rms.max() > 9.6 * MGON for c in cheaper
-    )  # linear theory may be optimistic, by little
+    # Linear theory may be optimistic, by little.
+    assert all(c.tilt.rms.max() > 9.6 * MGON for c in cheaper)
     times = [r.seconds for r in plan.ranked]
     assert times == sorted(times)
     kinds = {(r.equipment, r.model.name) for r in plan.ranked}
@@ -146,10 +145,8 @@ def test_simulation_agrees_with_linear_theory(plan):
     for ranked in plan.ranked:
         expected, simulated = ranked.tilt.rms, ranked.simulated
         assert simulated.statistics.simulated == plan.replicates
-        assert np.all(
-            np.abs(simulated.rms - expected)
-            < 4 * simulated.statistics["tilt_rms"].error + 0.01 * expected
-        )
+        error = 4 * simulated.statistics["tilt_rms"].error + 0.01 * expected
+        assert np.all(np.abs(simulated.rms - expected) < error)
 
 
 @pytest.mark.parametrize("name", data_sheet_names())
@@ -184,6 +181,11 @@ def test_what_would_spoil_a_plan_is_of_the_size_that_leaves_the_target():
             assert np.sqrt(alone.max()) == pytest.approx(question.target, rel=1e-9)
 
 
+def test_what_usually_spoils_a_plan_stands_beside_its_accuracy():
+    result = answer(asked(equipment=(ROBOT,)), replicates=200)
+    assert "if there is no rotation of the sensor in its mount" in part_lines("answer", result)[1]
+
+
 # --- words ---------------------------------------------------------------------------------------
 
 
@@ -197,10 +199,8 @@ def test_the_answer_that_the_readme_quotes_is_the_commands_own(told):
 @pytest.mark.parametrize(("target", "options", "said"), [
     (0.1, {"equipment": (BY_HAND,)}, "No calibration tried here reaches 0.1 mgon .rms. by hand"),
     (0.1, {"most_seconds": 600.0}, "within 10 min"),
-    (0.1, {"most_seconds": 60.0},
-     "No calibration fits within 1 min: the shortest takes 9 positions by hand"),
-    (0.1, {"most_positions": 5, "equipment": (BY_HAND,)},
-     "No calibration fits with at most 5 positions by hand: the shortest takes 9"),
+    (0.1, {"most_seconds": 60.0}, "No calibration fits within 1 min: the shortest takes 9"),
+    (0.1, {"most_positions": 5, "equipment": (BY_HAND,)}, "by hand: the shortest takes 9"),
     (0.1, {"sigma_angle": 1 * GON, "equipment": (ROBOT,)}, "the best leaves .* with a robot"),
     (0.1, {"confidence": 0.95}, r"\(95 % of them\)"),
     (7, {"most_positions": 20, "equipment": (BY_HAND,)}, "with at most 20 positions by hand"),
@@ -211,7 +211,6 @@ def test_what_cannot_be_reached_is_one_line_with_what_can(target, options, said)
     assert result.ranked == []
     (line,) = part_lines("answer", result)
     assert re.search(said, line)
-    assert "\n" not in line
 
 
 # --- against simulations that share no code ------------------------------------------------------
