@@ -147,23 +147,17 @@ def test_the_page_is_whole_and_the_same_again(page, study, tables):
     assert explorer_page(study, tables) == page
 
 
-def test_failures_and_an_infinite_condition(other, tables):
+def test_failures_models_of_one_title_and_degrees(other, tables):
     rows = table_of(other, "setups")
     sound = tables["cells"].index[tables["cells"]["estimable"]]
     states = [f"{n} of 40 converged" for n in (0, 7, 40)]
     assert list(rows.loc[sound[:3], "state"]) == states
     assert rows["condition"].isna().all()
-
-
-def test_models_of_the_same_title_are_told_apart(other, tables):
-    rows = table_of(other, "setups")
+    # Models of the same title are told apart.
     assert list(rows["model"]) == [f"<b>mine</b> ({name})" for name in tables["cells"]["model"]]
     assert set(rows["scheme"]) == {"24 McLaren", "12 icosahedron"}
-
-
-def test_angles_in_degrees(other, tables):
     assert "mgon" not in json.dumps(charts(other)["vconcat"], ensure_ascii=False)
-    same(table_of(other, "setups")["roll_rms"][:1], tables["leveling"]["roll_rms_mgon"][:1] * 0.9)
+    same(rows["roll_rms"][:1], tables["leveling"]["roll_rms_mgon"][:1] * 0.9)
 
 
 # --- in a browser --------------------------------------------------------------------------------
@@ -283,6 +277,14 @@ def test_what_is_chosen_is_a_part_of_the_address(shown, tables):
     pd.testing.assert_frame_equal(rows(shown), first)
     assert shown.locator("#chosen").inner_text() == said
     points(shown, 2 * (16 + 1))
+
+
+def test_schemes_without_redundancy(tab, folder):
+    keys = {"grids": [grid("bias-scale", ["faces-6", "fibonacci-6"], 2, approaches="gravity")]}
+    page = explorer_page(make_study(**keys), run_study(folder / "six", **keys))
+    (folder / "six.html").write_text(page, encoding="utf-8")
+    load(tab, (folder / "six.html").as_uri())
+    points(tab, 2 * (2 + 1))
 
 
 @pytest.mark.usefixtures("other")

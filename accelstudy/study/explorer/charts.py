@@ -76,7 +76,7 @@ def _alike(fields: Sequence[str]) -> str:
         f"!isValid(datum['{field}']) || !isValid(chosen['{field}']))"
         for field in fields
     )
-    return " && ".join(tests)
+    return " && ".join(["true", *tests])
 
 
 def tilt_chart(angle: str, approaches: Sequence[str], fields: Sequence[str]) -> Layers:

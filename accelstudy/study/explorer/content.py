@@ -94,7 +94,7 @@ def _ends(tables: Tables, quantity: str, by: list[str], columns: list[str]) -> p
 def parameters(cells: pd.DataFrame, tables: Tables, setups: pd.DataFrame) -> pd.DataFrame:
     """Parameters of set-ups, a row each: their numbers, unit, and the fields of the set-up."""
     ends = _ends(tables, "sd_posteriori", ["cell", "name"], ["end"])
-    ends = ends.add_prefix("sd_posteriori_mean_")
+    ends = ends.reindex(columns=[*ENDS]).add_prefix("sd_posteriori_mean_")
     summary = tables["summary"].join(ends, on=["cell", "parameter"])
     numbers = [*IN_UNITS, "sd_posteriori_mean_low", "sd_posteriori_mean_high"]
     table = in_shown_units(summary, *numbers)[["cell", "parameter", "unit", *numbers, *SHARES]]
