@@ -9,6 +9,7 @@ from pathlib import Path
 
 import yaml
 
+from accelstudy.basics.names import MAX_NAME_BYTES
 from accelstudy.basics.plugins import file_key
 from accelstudy.files.outputs import STUDY
 from accelstudy.files.shipped import shipped
@@ -33,7 +34,7 @@ def new_study(folder: Path, force: bool = False) -> str:
     InputError
         If the folder is not empty, or cannot be written.
     """
-    name = re.sub(r"[^A-Za-z0-9]+", "-", folder.resolve().name).strip("-") or "study"
+    name = re.sub(r"(?a)[\W_]+", "-", folder.resolve().name).strip("-")[:MAX_NAME_BYTES] or "study"
     sources = {
         "Snakefile": "study.smk",
         "config/config.yaml": "study.yaml",
@@ -43,6 +44,7 @@ def new_study(folder: Path, force: bool = False) -> str:
         (new / "config").mkdir()
         for target, source in sources.items():
             text = (TEMPLATE / source).read_text(encoding="utf-8")
+            text = text.replace("study: NAME", yaml.safe_dump({"study": name}).rstrip())
             (new / target).write_text(text.replace("NAME", name), encoding="utf-8")
         if named := file_key():  # the workflow runs in the new folder
             named = {key: [*map(os.path.abspath, files)] for key, files in named.items()}

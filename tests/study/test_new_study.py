@@ -17,16 +17,16 @@ def init(*arguments):
 
 @pytest.fixture(scope="module")
 def folder(tmp_path_factory):
-    folder = tmp_path_factory.mktemp("init") / "My sensor 2.0"
+    folder = tmp_path_factory.mktemp("init") / "2026.11.29"
     result = init(folder)
     assert result.exit_code == 0, result.output
-    assert str(folder / "results" / "My-sensor-2-0") in result.output
+    assert str(folder / "results" / "2026-11-29") in result.output
     return folder
 
 
 def test_the_configuration_is_a_study_with_figures(folder):
     study = read_study(folder / "config" / "config.yaml")
-    assert study.study == "My-sensor-2-0"
+    assert study.study == "2026-11-29"  # no date
     assert {"leveling-overview", "sweep-positions"} <= {*figure_names(study)}
 
 
