@@ -50,7 +50,7 @@ def _plain(value: float) -> str:
     return f"{value:.7g}"
 
 
-GRAVITY = Range(1e-3, 1e3, "m/s²")
+GRAVITY = Range(1.0, 30.0, "m/s²")  # from the Moon, 1.6, to Jupiter, 25
 GRAVITY_ERROR = Range(-1e2, 1e2, "m/s²")
 # Forces are always observed, and an observation without noise would have an infinite weight. The
 # best gravimeters resolve 1e-9 m/s².

@@ -56,6 +56,8 @@ def check_file_name(path: str | os.PathLike[str]) -> None:
     try:
         os.fspath(path).encode()
         os.lstat(path)
+    except (TypeError, AttributeError):
+        raise InputError(f"expected the path of a file, not {brief(path)}") from None
     except ValueError:  # not UTF-8, or with a zero
         raise InputError(f"{brief(str(path))}: no name of a file in UTF-8") from None
     except OSError as error:

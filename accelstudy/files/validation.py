@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import json
 import math
 from collections.abc import Mapping
+from datetime import date
 from difflib import get_close_matches
 from pathlib import Path
 from typing import Annotated, Any, ClassVar, TypeVar
@@ -28,6 +30,7 @@ from accelstudy.basics.errors import InputError, brief
 from accelstudy.basics.names import check_path_name
 from accelstudy.basics.plugins import load_plugins
 from accelstudy.basics.units import InputQuantity
+from accelstudy.basics.wording import short_list
 
 
 def _no_truth_value(value: Any) -> Any:
@@ -236,23 +239,29 @@ def _first_error(error: ValidationError, content: object, section: str) -> str:
     """Say in one line which key of a section is wrong, and what would be right."""
     # Beside a missing key there is often its name with a typo, which says more.
     errors = sorted(error.errors(), key=lambda each: each["type"] == "missing")
-    places = [_place(each, content) for each in errors]
-    first, place = errors[0], places[0]
-    key = ".".join(str(part)[:100] for part in (section, *place) if part != "")
+    places = [(section, *_place(each, content)) for each in errors]
+    keys = [".".join(str(part)[:100] for part in place if part != "") for place in places]
+    first, key = errors[0], keys[0]
     if first["type"] == "value_error":
         problem = first["ctx"]["error"]
         # The check of a whole section names the key itself.
-        mark = "." if isinstance(problem, KeyProblem) or not place else ": "
+        mark = "." if isinstance(problem, KeyProblem) or key == section else ": "
         text = mark.join(filter(None, [key, str(problem)]))
     else:
         # Where several kinds of values are right, there is an error for each of them.
-        wants = [_wanted(e) for e, p in zip(errors, places, strict=True) if p == place]
+        wants = [_wanted(e) for e, k in zip(errors, keys, strict=True) if k == key]
         wanted = " or ".join([wants[0], *(text.removeprefix("must be ") for text in wants[1:])])
-        value = "" if first["type"] == "missing" else f", not {brief(first['input'])}"
+        value = "" if first["type"] == "missing" else f", not {_as_written(first['input'])}"
         text = ": ".join(filter(None, [key, f"{wanted}{value}"]))
-    others = len({*places} - {place})
-    more = f" (and {others} more)" if others else ""
+    others = [*dict.fromkeys(other for other in keys if other != key)]
+    more = f" (also wrong: {short_list(others, 3)})" if others else ""
     return " ".join(f"{text}{more}".split())
+
+
+def _as_written(value: Any) -> str:
+    """Show a value as YAML has it: null, true and 2024-01-01."""
+    plain = value is None or isinstance(value, bool | date)
+    return json.dumps(value, default=str).strip('"') if plain else brief(value)
 
 
 def _place(error: ErrorDetails, content: Any) -> tuple[str | int, ...]:

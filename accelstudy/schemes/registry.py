@@ -3,16 +3,19 @@
 A module of this package holds one idea: a function that returns directions, and its registration.
 """
 
+import os
 import re
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import lru_cache
+from os import PathLike
 from typing import TypeVar
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from accelstudy.basics.errors import UnknownNameError
+from accelstudy.basics.arguments import check_type
+from accelstudy.basics.errors import InputError, UnknownNameError
 from accelstudy.basics.plugins import HOW
 from accelstudy.basics.registry import Registry
 from accelstudy.positions.scheme import Scheme, Status
@@ -89,12 +92,12 @@ def register(
     return decorate
 
 
-def get_scheme(name: str) -> Scheme:
+def get_scheme(name: str | PathLike[str]) -> Scheme:
     """Look up a scheme by its name, or read it from a file.
 
     Parameters
     ----------
-    name : str
+    name : str or path
         One of `scheme_names()`, a member of a family such as "fibonacci-60", the path of a YAML
         file with a scheme, or the name that such a scheme got when it was read.
 
@@ -109,6 +112,8 @@ def get_scheme(name: str) -> Scheme:
     InputError
         If a file cannot be read, or holds no scheme.
     """
+    check_type("scheme", name, str, PathLike, expected="the name of a scheme, or a file")
+    name = str(name)
     if is_scheme_file(name):
         return scheme_of_file(name)
     return known_scheme(name) or _registered(name)
@@ -120,6 +125,11 @@ def _registered(name: str) -> Scheme:
     for entry in sorted(_entries(), key=lambda entry: _is_family(entry.template)):
         if scheme := entry.scheme(name):
             return scheme
+    if os.path.splitext(name)[1] or os.path.isfile(name):
+        raise InputError(
+            f"{name}: no scheme; a file with one is YAML (directions: [[x, y, z], …]) and its "
+            "name ends in .yaml or .yml"
+        )
     families = f"; families, N from 1 to 9999: {', '.join(scheme_families())}"
     raise UnknownNameError("scheme", name, scheme_names(), families + HOW)
 

@@ -153,7 +153,8 @@ def _model(text: str) -> SensorModel:
 
 def _composed(effects: Iterable[str], name: str = "") -> SensorModel:
     """Compose a model; the same one for the same effects, however they are written."""
-    return compose(name, tuple(get_effect(effect).spec for effect in effects))
+    parts = (get_model(e).effects if "+" in e or e in MODELS else [get_effect(e)] for e in effects)
+    return compose(name, tuple(effect.spec for part in parts for effect in part))
 
 
 def _specs(effects: Collection[Any]) -> list[str]:
@@ -488,13 +489,20 @@ class Study(Configuration):
         for name, quantity in self.sensor.items():
             with _at(f"sensor.{name}"):
                 quantity.in_si(get_effect(name))
-        simulated = [] if self.simulated_effects is None else [self.simulated_effects]
-        models = [*simulated, *(model for grid in self.grids for model in grid.models)]
-        for effect in {e.spec: e for model in models for e in model.effects}.values():
+        simulated = self.simulated_effects.effects if self.simulated_effects else ()
+        models = [model for grid in self.grids for model in grid.models]
+        effects = [*simulated, *(effect for model in models for effect in model.effects)]
+        for effect in {effect.spec: effect for effect in effects}.values():
             if column := self.hold_plan.missing(effect):
                 raise InputError(
                     f"{HOLD_KEYS[column]}: missing; the effect {effect.name!r} needs the {column} "
                     "of each hold"
+                )
+        for effect in simulated:
+            if not self._keys.keys() & {effect.spec, effect.name}:
+                raise InputError(
+                    f"sensor.{effect.spec}: missing; each effect of simulated_effects needs its "
+                    "value and unit (0 is a value, too)"
                 )
         if self.sensitivity is not None:
             self.sensitivity.check(self)
@@ -551,23 +559,21 @@ class Study(Configuration):
     def hold_plan(self) -> HoldPlan:
         """Conditions of the holds."""
         holds = self.holds
-        return HoldPlan(
-            interval=holds.interval_s,
-            temperature=holds.temperature_degC,
-            temperature_order=holds.temperature_order,
-            vibration=holds.vibration_mps2,
-            yaw=holds.yaw,
-            seed=self.seed,
-        )
+        columns = holds.temperature_degC, holds.temperature_order, holds.vibration_mps2
+        return HoldPlan(holds.interval_s, *columns, holds.yaw, self.seed)
+
+    @cached_property
+    def _keys(self) -> dict[str, str]:
+        """Keys of `sensor` by the effects that they stand for."""
+        return {key: key for key in self.sensor} | {get_effect(k).spec: k for k in self.sensor}
 
     def truth(self, effects: Iterable[str]) -> dict[str, float]:
         """Return the true parameters of the given effects in SI; those not configured are zero."""
-        given = {**self.sensor, **{get_effect(k).spec: v for k, v in self.sensor.items()}}
         values: dict[str, float] = {}
         for effect in map(get_effect, effects):
             # The value may be that of the whole effect although the model has a part of it.
-            key = effect.spec if effect.spec in given else effect.name
-            configured = given[key].in_si(get_effect(key)) if key in given else {}
+            key = self._keys.get(effect.spec) or self._keys.get(effect.name)
+            configured = self.sensor[key].in_si(get_effect(key)) if key else {}
             values |= {p.name: configured.get(p.name, 0.0) for p in effect.parameters}
         return values
 

@@ -6,6 +6,7 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import replace
 from functools import cached_property
 from math import inf
+from os import PathLike
 from pathlib import Path
 from typing import Any, Literal
 
@@ -143,8 +144,8 @@ class Simulation(Result):
         grid: dict[str, Any] = {"sensor_sigma_mps2": [*map(tidy, sigma)], "replicates": replicates}
         for name, (several, get) in GRID.items():
             for one in as_sequence(names[name]):
-                check_type(name, one, str, expected="a name, or several")
-            grid[several] = [get(one).name for one in as_sequence(names[name])]
+                check_type(name, one, str, PathLike, expected="a name or a file, or several")
+            grid[several] = [get(str(one)).name for one in as_sequence(names[name])]
         for name, given in {**names, "sigma": sigma}.items():
             if not as_sequence(given):
                 raise InputError(f"{name}: none is given")

@@ -25,20 +25,14 @@ def sensitivity_table(study: Study, summary: pd.DataFrame) -> pd.DataFrame:
     study : Study, with `sensitivity`
     summary : DataFrame, the table of that name, with all cells that are analysed
     """
-    settings, sensor = _sensor(study)
+    settings, place, sensor = _set_up(study)
     calibrated: dict[str, dict[str, Any]] = {"forces": {}}
     for approach in APPROACHES:
         sigma = _empirical_sigma(settings, approach, summary)
         calibrated[approach] = {**sensor, "sigma_parameters": sigma}
     tables = {
         analysis: leveling_sensitivity(
-            settings.roll_gon,
-            settings.pitch_gon,
-            study.noise.sensor.sigma_mps2,
-            settings.base_samples,
-            study.seed,
-            g=study.gravity_mps2,
-            **of_parameters,
+            **place, base_samples=settings.base_samples, seed=study.seed, **of_parameters
         )
         for analysis, of_parameters in calibrated.items()
     }
@@ -56,29 +50,25 @@ def shapley_table(study: Study, summary: pd.DataFrame, correlations: pd.DataFram
     study : Study, with `sensitivity`
     summary, correlations : DataFrame, the tables of those names, as of `sensitivity_table`
     """
-    settings, sensor = _sensor(study)
+    settings, place, sensor = _set_up(study)
     names, tables = list(settings.model.parameter_names), {}
     for approach in APPROACHES:
         sigma = _empirical_sigma(settings, approach, summary)
         of_cell = correlations[correlations["cell"] == settings.cell(approach)]
         matrix = of_cell.pivot_table("adjustment", "parameter_1", "parameter_2", observed=True)
-        tables[approach] = leveling_shares(
-            settings.roll_gon,
-            settings.pitch_gon,
-            study.noise.sensor.sigma_mps2,
-            covariance=matrix.loc[names, names].to_numpy() * np.outer(sigma, sigma),
-            g=study.gravity_mps2,
-            **sensor,
-        )
+        covariance = matrix.loc[names, names].to_numpy() * np.outer(sigma, sigma)
+        tables[approach] = leveling_shares(**place, **sensor, covariance=covariance)
     return _joined(tables)
 
 
-def _sensor(study: Study) -> tuple[SensitivityConfig, dict[str, Any]]:
-    """Settings of the analysis; its model, and the true parameters of this, (u,), SI."""
+def _set_up(study: Study) -> tuple[SensitivityConfig, dict[str, Any], dict[str, Any]]:
+    """Settings of the analysis; attitudes, noise and gravity; model and true parameters, SI."""
     settings = study.sensitivity
     assert settings is not None
+    place: dict[str, Any] = {"roll_gon": settings.roll_gon, "pitch_gon": settings.pitch_gon}
+    place |= {"sigma_force": study.noise.sensor.sigma_mps2, "g": study.gravity_mps2}
     truth = settings.model.vector(study.truth(e.spec for e in settings.model.effects))
-    return settings, {"model": settings.model, "parameters": truth}
+    return settings, place, {"model": settings.model, "parameters": truth}
 
 
 def _empirical_sigma(

@@ -21,7 +21,6 @@ if TYPE_CHECKING:
 SIGMA = si("m/s^2", bounds.SIGMA_FORCE.least, bounds.SIGMA_FORCE.most)
 INTERVAL = si("s", bounds.INTERVAL.least, bounds.INTERVAL.most)
 Seconds = Annotated[Quantity | None, si("s", 1e-9, 1e6)]
-Gravity = Annotated[Quantity, kinds.GRAVITY]
 RobotSigma = Annotated[Quantity, angle(0, 100 * GON)]
 Ends = tuple[float, float] | str
 
@@ -94,7 +93,7 @@ def find_holds(
     reference_columns: Annotated[Mapping[str, str | int] | str | None, kinds.COLUMNS] = None,
     reference_offset: Annotated[Quantity | None, si("s", -1e12, 1e12)] = None,
     name: str | None = None,
-    gravity: Gravity | None = None,
+    gravity: kinds.Gravity | None = None,
     settings: kinds.File | None = None,
 ) -> Campaign:
     """Make a campaign of a raw log: find its static holds.
@@ -251,7 +250,7 @@ def simulate_campaign(
     sigma: Annotated[Quantity, SIGMA] = "2mm/s^2",
     sigma_known: bool = True,
     robot_sigma: RobotSigma = "3.2mgon",
-    gravity: Gravity = STANDARD_GRAVITY,
+    gravity: kinds.Gravity = STANDARD_GRAVITY,
     interval: Annotated[Quantity | None, INTERVAL] = "60s",
     temperature: Annotated[Ends | None, kinds.numbers("two numbers, as 20:40", ":", 2)] = None,
     temperature_order: str = "linear",

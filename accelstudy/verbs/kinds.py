@@ -182,11 +182,11 @@ COLUMN = kind_of_types("the name of a column or its number", str, int, name="col
 PATH = FilePath(path_of, "path", files=True)
 SHARE = si("1", 0.5, 0.999)
 SHARE_OR_RMS = Kind(_share_or_rms, "share")
-GRAVITY = si("m/s^2", bounds.GRAVITY.least, bounds.GRAVITY.most)
 File = Annotated[str | PathLike[str], PATH]
 Accuracy = Annotated[Quantity, angle(1e-9, math.pi / 2)]
 Tilt = Annotated[Quantity, angle(1e-3, math.pi / 2)]
 Share = Annotated[Quantity, SHARE]
+Gravity = Annotated[Quantity, si("m/s^2", bounds.GRAVITY.least, bounds.GRAVITY.most)]
 
 EFFECTS = Names("effect", "accelstudy.effects:effect_names")
 APPROACHES = Names("approach", "accelstudy.approaches:approach_names")

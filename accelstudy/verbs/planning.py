@@ -236,13 +236,13 @@ def advise(
 
 @verb
 def simulate(
-    model: str | Sequence[str],
-    scheme: str | Sequence[str],
+    model: str | PathLike[str] | Sequence[str | PathLike[str]],
+    scheme: str | PathLike[str] | Sequence[str | PathLike[str]],
     approach: str | Sequence[str],
     *,
     sigma: Sigma | Sequence[Sigma],
     robot_sigma: RobotSigma = "3.2mgon",
-    gravity: Annotated[Quantity, kinds.GRAVITY] = STANDARD_GRAVITY,
+    gravity: kinds.Gravity = STANDARD_GRAVITY,
     truth: Annotated[Mapping[str, float | str] | None, kinds.pairs("b_x=0.05,s_y=200ppm")] = None,
     replicates: Annotated[int, Range(2, bounds.REPLICATES.most)] = 1000,
     seed: kinds.Seed = 1,
@@ -253,7 +253,7 @@ def simulate(
 
     Parameters
     ----------
-    model, scheme, approach : str, or several
+    model, scheme, approach : str or path, or several
         A name or a file.
     sigma : float in m/s², or str with a unit, or several
         Noise of the mean of a position.

@@ -4,9 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from os import PathLike
-from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
+from accelstudy.basics.arguments import path_of
+from accelstudy.basics.errors import InputError
 from accelstudy.verbs import kinds
 from accelstudy.verbs.kinds import Names, verb
 
@@ -165,7 +166,7 @@ def init(
 
     from accelstudy.study.new_study import new_study
 
-    place = Path(folder)
+    place = path_of("folder", folder)
     results = place / "results" / new_study(place, force)
     lines = [
         f"study: {place}",
@@ -224,7 +225,10 @@ def claims(results: str | PathLike[str]) -> str:
     from accelstudy.files.tables import read_table
     from accelstudy.study.claims.page import claims_markdown
 
-    return claims_markdown(read_table(Path(results) / "claims.parquet"))
+    table = path_of("results", results) / "claims.parquet"
+    if not table.exists():
+        raise InputError(f"{table}: no such file; a study with paper: true has one")
+    return claims_markdown(read_table(table))
 
 
 @verb

@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Iterable, Sequence
 from os import PathLike
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -37,7 +36,7 @@ Row = dict[str, object]
 
 def rows_of(kind: str) -> pd.DataFrame:
     """Return a catalogue by its name, in which - may be a space."""
-    make = KINDS.get(kind.replace(" ", "-"))
+    make = KINDS.get(str(kind).replace(" ", "-"))
     if make is None:
         raise UnknownNameError("catalogue", kind, KINDS)
     return pd.DataFrame(make()).set_index("name")
@@ -181,13 +180,12 @@ def directions(name: str) -> pd.DataFrame:
 def cell_table(configurations: Sequence[str | PathLike[str]]) -> pd.DataFrame:
     """Return the cells of a study: redundancy, replicates, and why one cannot be estimated."""
     rows = []
-    for cell in read_study(*map(Path, as_sequence(configurations))).cells:
+    for cell in read_study(*as_sequence(configurations)).cells:
         found = estimability(
             cell.positions, cell.estimated_model, cell.conditions, cell.noise, hold=cell.hold
         )
         rows.append((cell.name, found.redundancy, cell.replicates, found.reason or ""))
     columns = ["cell", "redundancy", "replicates", "reason"]
     table = pd.DataFrame(rows, columns=columns).set_index("cell")
-    effort = f"{len(table)} cells, up to {table['replicates'].sum()} calibrations"
-    table.attrs["legend"] = effort
+    table.attrs["legend"] = f"{len(table)} cells, up to {table['replicates'].sum()} calibrations"
     return table

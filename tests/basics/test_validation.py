@@ -27,7 +27,7 @@ class Plan(ConfigSection):
     ({}, "grid", "must be given"),
     ({"gird": {"size": 1}}, "gird", "unknown key; did you mean 'grid'? (known:"),
     ({"grid": [1]}, "grid", "expected keys and values, not [1]"),
-    ({"grid": {"size": 0}, "names": 3}, "grid.size", "(and 1 more)"),
+    ({"grid": {"size": 0}, "names": 3}, "grid.size", "names)"),
     (3, "", "expected keys and values, not 3"),
 ])  # fmt: skip
 def test_an_error_is_one_line_with_source_and_key(content, key, said):

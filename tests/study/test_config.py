@@ -30,8 +30,7 @@ OVERLAYS = [ROOT / "config" / "smoke.yaml", *sorted((ROOT / "config" / "sweeps")
 def test_the_study_of_the_paper():
     study = read_study(CONFIG)
     assert study.gravity_mps2 == 9.80665
-    assert study.noise.sensor.sigma_mps2 == 0.002
-    assert study.noise.robot.sigma_mgon == 3.2
+    assert (study.noise.sensor.sigma_mps2, study.noise.robot.sigma_mgon) == (0.002, 3.2)
     truth = study.truth(["bias", "scale", "nonorthogonality"])
     assert [truth[f"b_{axis}"] for axis in "xyz"] == [0.05, 0.01, 0.03]
     assert [truth[f"s_{axis}"] for axis in "xyz"] == pytest.approx(3 * [200e-6], rel=1e-14)
@@ -59,8 +58,7 @@ def test_overlay_replaces_lists_and_merges_mappings(tmp_path):
     study = read_study(CONFIG, over)
     assert study.noise.robot.sigma_mgon == 7
     assert study.noise.sensor.sigma_mps2 == 0.002
-    assert study.sensor["bias"].value == [1, 2, 3]
-    assert study.sensor["bias"].unit == "m/s^2"
+    assert study.sensor["bias"].model_dump() == {"value": [1, 2, 3], "unit": "m/s^2"}
 
 
 def test_the_schema_file_is_that_of_the_models():
@@ -124,7 +122,7 @@ def test_one_may_stand_for_a_list():
 
 def test_names_become_the_things_that_they_name():
     study = make_study(
-        models={"mine": ["scale", "bias"]},
+        models={"mine": "scale+bias"},
         grids=[grid(["mine", NINE], ["faces-6"], approaches="all")],
         noise={"effects": ["heavy_tails( nu=5 )"]},
     )
@@ -141,7 +139,6 @@ def test_names_become_the_things_that_they_name():
 
 def test_numbers_as_yaml_1_1_reads_them():
     """YAML 1.1 takes 2e-3 for text, as it has no point."""
-    assert yaml.safe_load("2e-3") == "2e-3"
     assert make_study(noise={"sensor": {"sigma_mps2": "2e-3"}}).noise.sensor.sigma_mps2 == 2e-3
 
 

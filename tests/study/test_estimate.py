@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from scipy import stats
-from study_helpers import grid, make_cells, plain, run_study
+from study_helpers import NINE, PAPER_SENSOR, grid, make_cells, plain, run_study
 from usual import STANDARD_ERRORS
 
 from accelstudy.study.estimate import (
@@ -169,7 +169,8 @@ def test_quantiles_of_a_normal_sum(apart):
 STATISTICS = ("bias", "sd", "sd_ratio", "correlation", "variance_factor", "tilt_rms")
 
 
-LACKING = {"simulated_effects": ["bias", "scale", "nonorthogonality", "quadratic_scale"]}
+QUADRATIC = {"quadratic_scale": {"value": [200, -100, 300], "unit": "ppm"}}
+LACKING = {"simulated_effects": [NINE, "quadratic_scale"], "sensor": PAPER_SENSOR | QUADRATIC}
 DISTURBED = {"noise": {"effects": ["heavy_tails(nu=3)"]}}
 
 
