@@ -49,7 +49,8 @@ class PlannedCalibration(Part):
     pitch_rms_mgon : the same in pitch
     roll_rms_simulated_mgon : rms tilt error in roll over simulated calibrations
     pitch_rms_simulated_mgon : the same in pitch
-    both_rms_q95_simulated_mgon : bound that both angles stay below in 95 of 100
+    both_rms_q95_simulated_mgon : bound that both angles stay below in 95 of 100, by linear theory
+        over sensors if the model neglects effects
     """
 
     rank: int

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from accelstudy.approaches import get_approach
 from accelstudy.basics.units import STANDARD_GRAVITY
 from accelstudy.effects import get_effect
+from accelstudy.leveling.distribution import NOISE, Tilt
 from accelstudy.planning.candidates import Candidate
 from accelstudy.planning.question import NONLINEAR, Question, usual_size
 from accelstudy.simulation.hold_plan import HoldPlan
@@ -36,9 +37,12 @@ class SimulatedTilt:
     Attributes
     ----------
     statistics : CellStatistics
+    neglecting : Tilt, by linear theory, if the model neglects effects; sensors differ in these, and
+        one is simulated
     """
 
     statistics: CellStatistics
+    neglecting: Tilt | None = None
 
     @property
     def rms(self) -> Array:
@@ -46,7 +50,9 @@ class SimulatedTilt:
         return self.statistics["tilt_rms"].value
 
     def quantile_of_both(self, probability: float) -> float:
-        """Error that roll and pitch both stayed below in this share of the calibrations, rad."""
+        """Error that roll and pitch both stay below in this share of the calibrations, rad."""
+        if self.neglecting is not None:
+            return self.neglecting.quantile_of_both(probability)
         return float(self.statistics.quantile(TILT, BOTH, probability).value)
 
 
@@ -56,7 +62,8 @@ def simulate_candidate(
     """Simulate a candidate, with quantiles at the usual share and at that of the question."""
     shares = {QUOTED, question.confidence or QUOTED}
     (cell,) = with_compiled([cell_of(question, candidate, replicates)])
-    return SimulatedTilt(simulated_statistics(cell, seed, np.array(sorted(shares))))
+    found = simulated_statistics(cell, seed, np.array(sorted(shares)))
+    return SimulatedTilt(found, candidate.tilt if {*candidate.tilt.causes} - {NOISE} else None)
 
 
 def cell_of(question: Question, candidate: Candidate, replicates: int) -> Cell:

@@ -71,7 +71,7 @@ def implausible_parameters(effects: Sequence[Effect], parameters: Array, sigma: 
     values = np.nan_to_num(parameters, nan=np.inf)
     return [
         *impossible_parameters(effects, parameters, sigma),
-        *_beyond(effects, usual, values, sigma, "up to ± {1} is believed"),
+        *_beyond(effects, usual, values, sigma, "plausible up to ± {1}"),
     ]
 
 

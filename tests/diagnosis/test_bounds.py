@@ -97,3 +97,15 @@ def test_the_uncertainty_of_a_knee_is_in_all_sigmas():
     np.testing.assert_allclose(np.sqrt(np.diag(fit.cofactors)), found[:9], rtol=1e-12)
     without = np.sqrt(np.diag(np.linalg.inv(white[:9] @ white[:9].T)))
     assert np.max(found[6:9] / without[6:9]) > 1.3
+
+
+def test_of_effects_that_are_the_same_here_one_is_fitted_whose_size_a_sensor_can_have():
+    """It became warmer by 25 K within five minutes: a drift would be a hundred times as usual."""
+    warm = np.linspace(0, 1, N)[:, None]
+    forces = saturated(0.0, G, 6).forces + 25e-3 * warm * [3, -2, 4]
+    times = {"time": 300 * warm[:, 0], "temperature": 15 + 25 * warm[:, 0]}
+    _, singles = weighed(made(forces, G, SIGMA, **times))
+    members = ("bias_drift", "thermal_bias")
+    assert singles.members["bias_drift"] == members
+    cause = Cause("bias_drift", members, singles.best["bias_drift"])
+    assert [one.name for one in best_refit(singles, [cause]).causes] == ["thermal_bias"]

@@ -23,11 +23,11 @@ from accelstudy.planning.answer import CalibrationKind, answer
 from accelstudy.planning.candidates import candidates, information_of, tilt_of
 from accelstudy.planning.question import Equipment, Question
 from accelstudy.planning.reasons import errors_in_use, limits, spoilers
-from accelstudy.planning.simulated import cell_of
+from accelstudy.planning.simulated import BOTH, cell_of, simulate_candidate
 from accelstudy.planning.wording import part_lines
 from accelstudy.schemes import get_scheme
 from accelstudy.simulation.sessions import Noise
-from accelstudy.study.statistics import simulated_statistics
+from accelstudy.study.statistics import TILT, simulated_statistics
 
 MCLAREN = get_scheme("mclaren-24")
 HAS = ("bias", "scale", "nonorthogonality", "quadratic_scale")
@@ -278,6 +278,20 @@ def positions(plan, tmp_path_factory):
     folder = tmp_path_factory.mktemp("positions") / "plan"
     plan.save(folder)
     return yaml.safe_load((folder / "positions.yaml").read_text(encoding="utf-8"))["directions"]
+
+
+def test_both_angles_stay_below_a_bound_over_sensors_whose_neglected_effects_differ():
+    """Calibrations of sensors with nonlinearities drawn at random."""
+    question, rng = asked(get_data_sheet("adxl355"), equipment=(BY_HAND,)), np.random.default_rng(2)
+    candidate = _candidate(question)
+    cell, below = cell_of(question, candidate, 2), []
+    bound = simulate_candidate(question, candidate, 1, 20).quantile_of_both(0.95)
+    for _ in range(60):
+        bent = {k: rng.normal() * abs(x) if k[0] == "k" else x for k, x in cell.truth.items()}
+        mine = replace(cell, truth=bent)
+        at = simulated_statistics(mine, 1, np.array([0.5])).quantile(TILT, BOTH, 0.5).value
+        below.append(at < bound)  # what is neglected is nearly all: the middle one stands for all
+    assert np.mean(below) == pytest.approx(0.95, abs=0.1)
 
 
 def test_a_plan_writes_the_positions_that_it_simulated(plan, positions):

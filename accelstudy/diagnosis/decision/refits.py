@@ -17,9 +17,12 @@ from accelstudy.diagnosis.evidence.candidates import Cause, Singles, reshape
 from accelstudy.diagnosis.rules import RULES
 from accelstudy.diagnosis.space.frame import SessionFit
 from accelstudy.diagnosis.space.hypotheses import Hypothesis
+from accelstudy.effects import Effect
 from accelstudy.sensors.models import composition_name
-from accelstudy.sensors.plausibility import impossible_parameters
+from accelstudy.sensors.plausibility import implausible_parameters, impossible_parameters
 from accelstudy.sensors.sensor import SensorModel
+
+Array = NDArray[np.float64]
 
 EDGE_SHARE = 0.1
 """Part of what is searched within which the least is at its end."""
@@ -56,9 +59,14 @@ def refit(base: Solution, chosen: Sequence[Hypothesis]) -> Solution | None:
 
 def impossible(solution: Solution) -> list[str]:
     """Parameters that are beyond their physical bounds."""
+    return impossible_parameters(*_estimated(solution))
+
+
+def _estimated(solution: Solution) -> tuple[Sequence[Effect], Array, Array]:
+    """Effects of a fit, their parameters and the sigmas of these."""
     sigma = np.sqrt(np.diag(solution.cofactors) * max(1.0, solution.omega / solution.redundancy))
     u = solution.model.n_parameters
-    return impossible_parameters(solution.model.effects, solution.parameters[:u], sigma[:u])
+    return solution.model.effects, solution.parameters[:u], sigma[:u]
 
 
 class Refit(NamedTuple):
@@ -71,7 +79,8 @@ class Refit(NamedTuple):
 def best_refit(singles: Singles, chosen: Sequence[Cause]) -> Refit | None:
     """Fit with the members of classes that fit best, by their own names; None without a solution.
 
-    To first order the members of a class are the same. Large effects are not of first order.
+    To first order the members of a class are the same. Large effects are not of first order. Of
+    members between which the residuals do not decide, those go first whose sizes a sensor can have.
 
     Parameters
     ----------
@@ -92,6 +101,10 @@ def best_refit(singles: Singles, chosen: Sequence[Cause]) -> Refit | None:
     if not solved:
         return None
     least = min(fit.omega for _, fit in solved)
+    undecided = [item for item in solved if item[1].omega <= least + 2 * RULES.undecided]
+    believable = [x for x in undecided if not implausible_parameters(*_estimated(x[1]))]
+    if believable:
+        solved, least = believable, min(fit.omega for _, fit in believable)
     # Fits that differ by less count as equal: rounding errors must not choose the name.
     best, fit = next(item for item in solved if item[1].omega <= least + RULES.same_fit)
     u = len(fit.parameters)
