@@ -54,7 +54,7 @@ def table_lines(plan: Plan) -> list[str]:
     return [
         *("  ".join(cells).rstrip() for cells in zip(*aligned, strict=True)),
         f"roll, pitch: rms of {plan.replicates} simulated calibrations each; both: what roll and",
-        "pitch both stay below in 95 of 100 of them, over sensors whose neglected effects differ",
+        "pitch both stay below in 95 of 100 of them (over sensors, if effects are neglected)",
     ]
 
 

@@ -18,6 +18,8 @@ from accelstudy.diagnosis.evidence.noise import (
     STEPS,
     TAILS,
     NoiseTest,
+    lack_of_fit,
+    square_of_repeats,
     worst_of,
 )
 from accelstudy.diagnosis.evidence.size import Level
@@ -142,6 +144,8 @@ def test_lack_of_fit_is_the_analysis_of_variance(missed):
     pure = np.sum((e[:18] - e[18:]) ** 2) / 2
     f = (np.sum(e**2) - pure) / 9 / (pure / 18)
     assert problem.lack_of_fit == pytest.approx(stats.f.sf(f, 9, 18), rel=0.02)
+    same = SimpleNamespace(z=np.ones(4), redundancy=4)  # coarse readings repeat exactly
+    assert lack_of_fit(same, *square_of_repeats(same, np.full((4, 1), 0.5))) < 1e-12
 
 
 @pytest.mark.parametrize(("level", "scatter", "holds"), [

@@ -228,6 +228,8 @@ def _step(values: Array, around: Array) -> float:
     return float(divisors[power > 0.99 * power[0]].max() / peak)
 
 
+LEAST_OF_REPEATS = 1e-12
+"""Part of the squares that differences of repeats have at least."""
 SPECIFIC = (STEPS, COLOUR, AXES, TAILS, LEVEL)
 """What may be wrong with the noise, the most specific first."""
 
@@ -274,9 +276,10 @@ def square_of_repeats(residuals: Residuals, same: Array) -> tuple[float, int]:
     residuals : Residuals
     same : (m, l) array, orthonormal basis of what they have in common
     """
-    z = residuals.z
-    square = float(z @ z - np.sum((z @ same) ** 2))
-    return max(square, 0.0), residuals.redundancy - same.shape[1]
+    z, freedom = residuals.z, residuals.redundancy - same.shape[1]
+    whole = float(z @ z)
+    # Coarse readings repeat exactly.
+    return max(whole - float(np.sum((z @ same) ** 2)), LEAST_OF_REPEATS * whole), freedom
 
 
 # --- likelihoods of unequal axes and of coloured noise -------------------------------------------
