@@ -1,4 +1,4 @@
-"""A parameter of a sensor over time: whether it drifts, and scatters between sessions.
+"""A parameter of a sensor over time: whether it drifts, steps, and scatters between sessions.
 
 Its value in session i at time tᵢ is a + r tᵢ + sᵢ + eᵢ: a line, the scatter of the sessions with
 the sd τ, as by switching off and on, and the noise of the calibration.
@@ -10,6 +10,8 @@ the sd τ, as by switching off and on, and the noise of the calibration.
   2693; exact where all sigmas are equal).
 * That is so if the scatter of each session is independent of that of the others. If instead it adds
   up from session to session, a random walk, the interval of the rate is much too short.
+* It steps if a step at one time instead of the line is much more probable, whatever the scatter is.
+  Both have a change from the first to the last session; steps at any time are as probable.
 """
 
 from __future__ import annotations
@@ -19,17 +21,23 @@ from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy import stats
+from scipy import special, stats
 
 from accelstudy.adjustment.random_effects import RandomEffects
 from accelstudy.basics.shares import sigmas_95
 from accelstudy.epochs.congruence import LEVEL, dof_of_squares, f_tail
-from accelstudy.epochs.file_format import Rate, Scatter
+from accelstudy.epochs.file_format import Rate, Scatter, Step
 
 Array = NDArray[np.float64]
 
 YEAR = 365.25 * 86400.0
 """s"""
+MIN_STEP = 4
+"""Calibrations of which a step and a line are compared."""
+SURE = 0.9
+"""Probability from which on a step is said, and of the sessions between which it is."""
+POSSIBLE = {"drifts": 1 - SURE, "scatters": 0.7}
+"""Probabilities from which on a step is said to be possible instead."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -53,8 +61,50 @@ class ParameterCourse:
     @cached_property
     def line(self) -> RandomEffects:
         """Value at the time 0, and rate per year."""
-        design = np.column_stack([np.ones_like(self.years), self.years])
+        return self._level_and(self.years)
+
+    def _level_and(self, course: Array) -> RandomEffects:
+        """Model of a level, and of a change of some course."""
+        design = np.column_stack([np.ones_like(self.years), course])
         return RandomEffects(self.values, self.variances, design)
+
+    @cached_property
+    def _steps(self) -> list[RandomEffects]:
+        """Value before a step, and its size, for a step after each session but the last."""
+        after = np.tri(len(self.years), k=-1).T[:-1]
+        return [self._level_and(course) for course in after]
+
+    @cached_property
+    def _step_evidence(self) -> Array:
+        """Logarithms of the likelihoods of these steps over that of a line."""
+        span = np.ptp(self.years)
+        line = self._level_and(self.years / span).log_evidence()
+        with np.errstate(divide="ignore"):  # there is no step between two sessions of one date
+            at = np.log(np.diff(self.years) / span)
+        return np.array([model.log_evidence() for model in self._steps]) + at - line
+
+    @cached_property
+    def step(self) -> Step | None:
+        """The step that explains most, and how probable a step is; None of few calibrations."""
+        if len(self.years) < MIN_STEP:
+            return None
+        shares, order = special.softmax(self._step_evidence), np.argsort(-self._step_evidence)
+        likely = order[: np.searchsorted(np.cumsum(shares[order]), SURE) + 1]
+        best = self._steps[order[0]]
+        return Step(
+            size=best.estimates[1],
+            sigma=np.sqrt(best.covariance[1, 1]),
+            after=likely.min() + 1,
+            before=likely.max() + 2,
+            probability=special.expit(special.logsumexp(self._step_evidence)),
+        )
+
+    @cached_property
+    def model(self) -> RandomEffects:
+        """The line; the step where it is so much more probable."""
+        if self.step is None or self.step.probability < SURE:
+            return self.line
+        return self._steps[int(np.argmax(self._step_evidence))]
 
     @cached_property
     def rate(self) -> Rate:
@@ -66,17 +116,18 @@ class ParameterCourse:
 
     @cached_property
     def scatter(self) -> Scatter:
-        """Scatter about the line."""
-        line, root = self.line, np.sqrt(self.variances)
-        smooth = line.design @ line.combination(0.0) * root / root[:, None]
+        """Scatter about the line, or the levels before and after a step."""
+        model, root = self.model, np.sqrt(self.variances)
+        smooth = model.design @ model.combination(0.0) * root / root[:, None]
         left = np.eye(len(root)) - smooth
         nu = dof_of_squares(np.diag(left), left**2, self.dof, self.level)
-        p_value = f_tail(line.squares(0.0) / line.dof, line.dof, nu)
-        return Scatter(sd=line.scatter, ci95=[*line.scatter_interval()], p_value=p_value)
+        p_value = f_tail(model.squares(0.0) / model.dof, model.dof, nu)
+        return Scatter(sd=model.scatter, ci95=[*model.scatter_interval()], p_value=p_value)
 
     @property
     def found(self) -> tuple[str, ...]:
         """What a parameter that changed does, in words; "changed" if that is not sure."""
-        named = {"drifts": self.rate.p_value, "scatters": self.scatter.p_value}
+        change = {"drifts": self.rate.p_value} if self.model is self.line else {"steps": 0.0}
+        named = {**change, "scatters": self.scatter.p_value}
         found = (word for word, p in named.items() if p is not None and p <= self.level)
         return tuple(found) or ("changed",)

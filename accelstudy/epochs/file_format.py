@@ -66,7 +66,7 @@ class Rate(Part):
 
 
 class Scatter(Part):
-    """Its scatter from session to session.
+    """Its scatter from session to session, beside drift or step.
 
     Attributes
     ----------
@@ -78,6 +78,25 @@ class Scatter(Part):
     sd: NotNegative
     ci95: list[float | None] | None = None
     p_value: float | None = None
+
+
+class Step(Part):
+    """A single step instead of a drift.
+
+    Attributes
+    ----------
+    size : most probable
+    sigma : of the size
+    after : calibration, from 1, after which it is with a probability of 0.9
+    before : calibration before which it is
+    probability : of a step, if drifts are as frequent
+    """
+
+    size: Finite
+    sigma: NotNegative
+    after: int
+    before: int
+    probability: float
 
 
 class Parameter(Part):
@@ -96,6 +115,7 @@ class Parameter(Part):
     found : what it does; changed if a drift and scatter cannot be distinguished
     rate : null of two calibrations
     scatter : null of two calibrations
+    step : null of fewer than four calibrations
     """
 
     name: str
@@ -105,12 +125,13 @@ class Parameter(Part):
     change: float | None = None
     sigma: float | None = None
     detectable: float | None = None
-    found: list[Literal["drifts", "scatters", "changed"]] = Field([])
+    found: list[Literal["steps", "drifts", "scatters", "changed"]] = Field([])
     or_: list[str] = Field(
         [], alias="or", description="parameters that may have changed instead of it"
     )
     rate: Rate | None
     scatter: Scatter | None
+    step: Step | None = None
 
 
 class Tilt(Part):

@@ -24,7 +24,7 @@ from accelstudy.campaign.calibration.sensor_calibration import SensorCalibration
 from accelstudy.drawing.saving import save_all
 from accelstudy.drawing.style import FULL, INK, group_colour, group_of, new_figure, symbol
 from accelstudy.epochs.congruence import LEVEL, Congruence
-from accelstudy.epochs.course import YEAR, ParameterCourse
+from accelstudy.epochs.course import POSSIBLE, YEAR, ParameterCourse
 from accelstudy.epochs.file_format import Calibration, HistoryDocument, Parameter, Test, Tilt
 from accelstudy.epochs.interval import Interval
 from accelstudy.files.outputs import HISTORY
@@ -47,7 +47,7 @@ class History(Result):
 
     What changed is told by all parameters together, with their whole covariance matrices. Of two
     calibrations that is all; of three or more each parameter that changed is a line over time,
-    beside which sessions scatter.
+    or a step, beside which sessions scatter.
 
     Attributes
     ----------
@@ -215,6 +215,7 @@ class History(Result):
                 "or": [names[i] for i in instead],
                 "rate": course and course.rate,
                 "scatter": course and course.scatter,
+                "step": course and course.step,
             }
             table.append(Parameter.model_validate(entry))
         return table
@@ -230,6 +231,11 @@ class History(Result):
         by_size = sorted(self.parameters, key=lambda one: one.detectable or 0.0)
         largest = {one.unit: one for one in by_size}
 
+        def step_text(p: Parameter) -> str:
+            assert p.step is not None
+            after, before = (self.dates[k - 1].date() for k in (p.step.after, p.step.before))
+            return f"{change_text(p, p.step.size, p.step.sigma)} between {after} and {before}"
+
         def texts(word: str, text: Callable[[Any], str]) -> list[str]:
             return [text(one) for one in self.parameters if word in one.found]
 
@@ -237,6 +243,12 @@ class History(Result):
             "epochs/wording.txt.j2",
             "history",
             self,
+            steps=texts("steps", step_text),
+            possible=[
+                step_text(p)
+                for p in self.parameters
+                if p.found and p.step and p.step.probability > POSSIBLE.get(p.found[0], 1.0)
+            ],
             drifts=texts("drifts", lambda p: change_text(p, p.rate.per_year, p.rate.sigma)),
             scatters=texts("scatters", lambda p: f"{p.name} by {size_text(p.scatter.sd, p.unit)}"),
             changed=texts("changed", lambda p: change_text(p, p.change, p.sigma)),
@@ -315,10 +327,10 @@ class History(Result):
         ax.xaxis.set(major_locator=locator, major_formatter=formatter)
         if not self.courses:
             return
-        line, ends = self.courses[k].line.estimates, [0, -1]
-        values = to_display(line[0] + line[1] * self.years[ends], unit)
-        style = "-" if "drifts" in found else ":"
-        ax.plot(times[ends], values, style, color=group_colour(group_of(parameter.name)))
+        model = self.courses[k].model
+        style = "-" if {"drifts", "steps"} & {*found} else ":"
+        values = to_display(model.design @ model.estimates, unit)
+        ax.plot(times, values, style, color=group_colour(group_of(parameter.name)))
 
 
 def _check_alike(calibrations: Sequence[SensorCalibration]) -> None:
