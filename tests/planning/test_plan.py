@@ -15,14 +15,14 @@ from places import ROOT
 from usual import NINE, G
 
 from accelstudy.basics.units import GON, MGON
-from accelstudy.data_sheets import DataSheet, data_sheet_names, get_data_sheet, sheet_of_sigma
+from accelstudy.data_sheets import DataSheet, get_data_sheet, sheet_of_sigma
 from accelstudy.design.continuous import continuous_optimum
 from accelstudy.design.spaces import Attitudes
 from accelstudy.planning import candidates as known
 from accelstudy.planning.answer import CalibrationKind, answer
 from accelstudy.planning.candidates import candidates, information_of, tilt_of
 from accelstudy.planning.question import Equipment, Question
-from accelstudy.planning.reasons import errors_in_use, limits, spoilers
+from accelstudy.planning.reasons import errors_in_use, spoilers
 from accelstudy.planning.simulated import BOTH, cell_of, simulate_candidate
 from accelstudy.planning.wording import part_lines
 from accelstudy.schemes import get_scheme
@@ -147,19 +147,6 @@ def test_simulation_agrees_with_linear_theory(plan):
         assert simulated.statistics.simulated == plan.replicates
         error = 4 * simulated.statistics["tilt_rms"].error + 0.01 * expected
         assert np.all(np.abs(simulated.rms - expected) < error)
-
-
-@pytest.mark.parametrize("name", data_sheet_names())
-@pytest.mark.parametrize("equipment", [BY_HAND, ROBOT], ids=lambda e: e.name)
-def test_each_sensor_with_each_equipment_has_candidates_and_reasons(name, equipment):
-    question = asked(get_data_sheet(name), equipment=(equipment,), holds=(10.0,))
-    compared = candidates(question)
-    best = min(compared, key=lambda c: c.tilt.rms.max())
-    assert best.equipment == equipment
-    assert 0 < best.tilt.rms.max() < 100 * MGON
-    assert limits(question, best)
-    assert all(spoiler.size > 0 for spoiler in spoilers(question, best))
-    assert errors_in_use(question)["reading"] > 0
 
 
 def test_neglected_effects_decide_the_model():
