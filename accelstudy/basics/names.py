@@ -23,7 +23,7 @@ def path_name(text: str, otherwise: str) -> str:
 
 
 def distinct(names: Sequence[str]) -> list[str]:
-    """Names that differ: where several are one, each has its number among all behind it."""
+    """Return names that differ: equal ones get their number among all names behind them."""
     numbered = [f"{name}-{number}" for number, name in enumerate(names, start=1)]
     several = {name for name, count in Counter(names).items() if count > 1}
     own = [new if name in several else name for name, new in zip(names, numbered, strict=True)]

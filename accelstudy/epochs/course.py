@@ -64,7 +64,7 @@ class ParameterCourse:
         return self._level_and(self.years)
 
     def _level_and(self, course: Array) -> RandomEffects:
-        """Model of a level, and of a change of some course."""
+        """Model of a level, and of a change that follows some course."""
         design = np.column_stack([np.ones_like(self.years), course])
         return RandomEffects(self.values, self.variances, design)
 
@@ -101,7 +101,7 @@ class ParameterCourse:
 
     @cached_property
     def model(self) -> RandomEffects:
-        """The line; the step where it is so much more probable."""
+        """Model of the parameter: the best step where a step is sure, else the line."""
         if self.step is None or self.step.probability < SURE:
             return self.line
         return self._steps[int(np.argmax(self._step_evidence))]

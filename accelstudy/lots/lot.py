@@ -89,7 +89,7 @@ class LotDiagnosis:
 
     @property
     def p_value_of_usual(self) -> float:
-        """That of the sensors which are not odd, beside what was found."""
+        """P-value of the sensors that are not odd, beside what was found."""
         return min(2 * self.last.p_value_of_usual, 1.0)
 
     @property
@@ -136,14 +136,13 @@ class LotDiagnosis:
         having = {one.names[0]: one.having for one in self.effects}
         odd, states = {one.campaign for one in self.odd}, list[SensorState]()
         usual = np.prod([1 - self.last.posterior_odd, *(1 - one.apart for one in self.effects)], 0)
-        posterior_odd = (1 - usual).tolist()
-        for i, (one, own) in enumerate(zip(self.evidence, posterior_odd, strict=True)):
+        for i, (one, p_usual) in enumerate(zip(self.evidence, usual.tolist(), strict=True)):
             names = [name for name, p in having.items() if p[i] > MIN_HAVING]
             sure = math.prod(max(p[i], 1 - p[i]) for p in having.values())
             if one.campaign in odd:
-                states.append(SensorState(one.campaign, (*names, ODD), sure * own))
+                states.append(SensorState(one.campaign, (*names, ODD), sure * (1 - p_usual)))
             else:
-                states.append(SensorState(one.campaign, tuple(names), sure * (1 - own)))
+                states.append(SensorState(one.campaign, tuple(names), sure * p_usual))
         return states
 
 

@@ -256,8 +256,7 @@ class Pass:
         if spec is not None:
             sudden = get_effect(spec).sudden
             own = tuple(specs.get(first, spec) if sudden else spec for specs in each)
-        about = members, min(posterior, 1.0), share, (low, high), spec, own
-        return LotEffect(*about, having, apart)
+        return LotEffect(members, min(posterior, 1.0), share, (low, high), spec, own, having, apart)
 
     @cached_property
     def _rare(self) -> set[str]:

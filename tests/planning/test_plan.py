@@ -141,6 +141,21 @@ def test_the_answer_is_the_cheapest_that_reaches_the_target(plan):
     assert len(kinds) == len(plan.ranked)
 
 
+def test_simulation_agrees_with_linear_theory(plan):
+    for ranked in plan.ranked:
+        expected, simulated = ranked.tilt.rms, ranked.simulated
+        assert simulated.statistics.simulated == plan.replicates
+        error = 4 * simulated.statistics["tilt_rms"].error + 0.01 * expected
+        assert np.all(np.abs(simulated.rms - expected) < error)
+
+
+def test_neglected_effects_decide_the_model():
+    bent = DataSheet("s", position_sigma=0.5e-3, nonlinearity=0.005, full_scale=19.6133)
+    result = answer(asked(bent, equipment=(BY_HAND,)), replicates=500)
+    names = [effect.name for effect in result.first.model.effects]
+    assert {"quadratic_scale", "cubic_scale"} <= set(names)
+
+
 def test_what_would_spoil_a_plan_is_of_the_size_that_leaves_the_target():
     question = asked(sheet_of_sigma(0.002))
     candidate = _candidate(question, equipment="robot")
@@ -171,8 +186,10 @@ def test_the_answer_that_the_readme_quotes_is_the_commands_own(told):
 @pytest.mark.parametrize(("target", "options", "said"), [
     (0.1, {"equipment": (BY_HAND,)}, "No calibration tried here reaches 0.1 mgon .rms. by hand"),
     (0.1, {"most_seconds": 600.0}, "within 10 min"),
-    (0.1, {"most_seconds": 60.0}, "No calibration fits within 1 min: the shortest takes 9"),
-    (0.1, {"most_positions": 5, "equipment": (BY_HAND,)}, "by hand: the shortest takes 9"),
+    (0.1, {"most_seconds": 60.0},
+     "No calibration fits within 1 min: the shortest takes 9 positions by hand"),
+    (0.1, {"most_positions": 5, "equipment": (BY_HAND,)},
+     "No calibration fits with at most 5 positions by hand: the shortest takes 9"),
     (0.1, {"sigma_angle": 1 * GON, "equipment": (ROBOT,)}, "the best leaves .* with a robot"),
     (0.1, {"confidence": 0.95}, r"\(95 % of them\)"),
     (7, {"most_positions": 20, "equipment": (BY_HAND,)}, "with at most 20 positions by hand"),
@@ -183,6 +200,7 @@ def test_what_cannot_be_reached_is_one_line_with_what_can(target, options, said)
     assert result.ranked == []
     (line,) = part_lines("answer", result)
     assert re.search(said, line)
+    assert "\n" not in line
 
 
 # --- against simulations that share no code ------------------------------------------------------

@@ -139,6 +139,7 @@ def test_names_become_the_things_that_they_name():
 
 def test_numbers_as_yaml_1_1_reads_them():
     """YAML 1.1 takes 2e-3 for text, as it has no point."""
+    assert yaml.safe_load("2e-3") == "2e-3"
     assert make_study(noise={"sensor": {"sigma_mps2": "2e-3"}}).noise.sensor.sigma_mps2 == 2e-3
 
 

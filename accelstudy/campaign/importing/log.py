@@ -147,7 +147,7 @@ class Log:
         return f"{where}, column {self.raw.names[self.places[key]]} ({key}): {cell}"
 
     def check_units(self, conditions: Collection[str]) -> None:
-        """Raise `InputError` if conditions are such as in another unit, going by the first rows."""
+        """Refuse conditions that look like another unit, by the median of the first rows."""
         for key in [key for key in self.conditions if key in conditions]:
             usual = float(self.samples[key][:SAMPLED_ROWS].median())
             if np.isfinite(usual):

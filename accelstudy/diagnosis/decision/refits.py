@@ -23,6 +23,7 @@ from accelstudy.sensors.plausibility import implausible_parameters, impossible_p
 from accelstudy.sensors.sensor import SensorModel
 
 Array = NDArray[np.float64]
+Solved = tuple[Sequence[Hypothesis], Solution]
 
 EDGE_SHARE = 0.1
 """Part of what is searched within which the least is at its end."""
@@ -59,10 +60,10 @@ def refit(base: Solution, chosen: Sequence[Hypothesis]) -> Solution | None:
 
 def impossible(solution: Solution) -> list[str]:
     """Parameters that are beyond their physical bounds."""
-    return impossible_parameters(*_estimated(solution))
+    return impossible_parameters(*_estimates(solution))
 
 
-def _estimated(solution: Solution) -> tuple[Sequence[Effect], Array, Array]:
+def _estimates(solution: Solution) -> tuple[Sequence[Effect], Array, Array]:
     """Effects of a fit, their parameters and the sigmas of these."""
     sigma = np.sqrt(np.diag(solution.cofactors) * max(1.0, solution.omega / solution.redundancy))
     u = solution.model.n_parameters
@@ -100,13 +101,15 @@ def best_refit(singles: Singles, chosen: Sequence[Cause]) -> Refit | None:
     solved = [(one, fit) for one in sharp if (fit := refit(base, one)) is not None]
     if not solved:
         return None
-    least = min(fit.omega for _, fit in solved)
-    undecided = [item for item in solved if item[1].omega <= least + 2 * RULES.undecided]
-    believable = [x for x in undecided if not implausible_parameters(*_estimated(x[1]))]
-    if believable:
-        solved, least = believable, min(fit.omega for _, fit in believable)
+
+    def within(pool: Sequence[Solved], difference: float) -> list[Solved]:
+        least = min(fit.omega for _, fit in pool)
+        return [item for item in pool if item[1].omega <= least + difference]
+
+    undecided = within(solved, 2 * RULES.undecided)
+    plausible = [x for x in undecided if not implausible_parameters(*_estimates(x[1]))]
     # Fits that differ by less count as equal: rounding errors must not choose the name.
-    best, fit = next(item for item in solved if item[1].omega <= least + RULES.same_fit)
+    best, fit = within(plausible or solved, RULES.same_fit)[0]
     u = len(fit.parameters)
     named = zip(chosen, best, strict=True)
     causes = tuple(Cause(h.name, one.members, h, one.posterior) for one, h in named)
