@@ -11,7 +11,8 @@ the sd τ, as by switching off and on, and the noise of the calibration.
 * That is so if the scatter of each session is independent of that of the others. If instead it adds
   up from session to session, a random walk, the interval of the rate is much too short.
 * It steps if a step at one time instead of the line is much more probable, whatever the scatter is.
-  Both have a change from the first to the last session; steps at any time are as probable.
+  Both have a change from the first to the last session; steps at any time are as probable. The line
+  has this step in it then, and a degree of freedom less.
 """
 
 from __future__ import annotations
@@ -58,14 +59,9 @@ class ParameterCourse:
     dof: Array
     level: float = LEVEL
 
-    @cached_property
-    def line(self) -> RandomEffects:
-        """Value at the time 0, and rate per year."""
-        return self._level_and(self.years)
-
-    def _level_and(self, course: Array) -> RandomEffects:
-        """Model of a level, and of a change that follows some course."""
-        design = np.column_stack([np.ones_like(self.years), course])
+    def _level_and(self, *courses: Array) -> RandomEffects:
+        """Model of a level, and of changes that follow some courses."""
+        design = np.column_stack([np.ones_like(self.years), *courses])
         return RandomEffects(self.values, self.variances, design)
 
     @cached_property
@@ -101,22 +97,29 @@ class ParameterCourse:
 
     @cached_property
     def model(self) -> RandomEffects:
-        """Model of the parameter: the best step where a step is sure, else the line."""
-        if self.step is None or self.step.probability < SURE:
-            return self.line
-        return self._steps[int(np.argmax(self._step_evidence))]
+        """Value at the time 0, rate per year, and the size of a step where one is sure."""
+        if not self._is_step:
+            return self._level_and(self.years)
+        step = self._steps[int(np.argmax(self._step_evidence))].design[:, 1]
+        return self._level_and(self.years, step)
+
+    @property
+    def _is_step(self) -> bool:
+        """Whether a step is sure."""
+        return self.step is not None and self.step.probability >= SURE
 
     @cached_property
     def rate(self) -> Rate:
-        """Rate per year, if sessions are independent."""
-        rate, sigma = float(self.line.estimates[1]), float(np.sqrt(self.line.covariance[1, 1]))
-        half = sigmas_95(self.line.dof) * sigma
-        p_value = 2 * float(stats.t.sf(abs(rate) / sigma, self.line.dof))
+        """Rate per year, beside a step where one is sure, if sessions are independent."""
+        rate, variance, dof = self.model.estimates[1], self.model.covariance[1, 1], self.model.dof
+        sigma = np.sqrt(variance)
+        half = sigmas_95(dof) * sigma
+        p_value = 2 * stats.t.sf(abs(rate) / sigma, dof)
         return Rate(per_year=rate, sigma=sigma, ci95=[rate - half, rate + half], p_value=p_value)
 
     @cached_property
     def scatter(self) -> Scatter:
-        """Scatter about the line, or the levels before and after a step."""
+        """Scatter about the line, with the step in it where one is sure."""
         model, root = self.model, np.sqrt(self.variances)
         smooth = model.design @ model.combination(0.0) * root / root[:, None]
         left = np.eye(len(root)) - smooth
@@ -127,7 +130,7 @@ class ParameterCourse:
     @property
     def found(self) -> tuple[str, ...]:
         """What a parameter that changed does, in words; "changed" if that is not sure."""
-        change = {"drifts": self.rate.p_value} if self.model is self.line else {"steps": 0.0}
-        named = {**change, "scatters": self.scatter.p_value}
-        found = (word for word, p in named.items() if p is not None and p <= self.level)
+        tests = {"drifts": self.rate.p_value, "scatters": self.scatter.p_value}
+        found = ["steps"] if self._is_step else []
+        found += [word for word, p in tests.items() if p is not None and p <= self.level]
         return tuple(found) or ("changed",)

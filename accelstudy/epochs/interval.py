@@ -115,14 +115,15 @@ class Interval:
         noise = np.array([_normal(rng, c) for c in history.covariances])
         at_once, per_year = noise[-1].copy(), np.zeros_like(noise[-1])
         for k, course in enumerate(history.courses):
-            scatter = course.line.scatter
+            scatter = course.model.scatter
             sessions = scatter * rng.standard_normal((len(noise) + 1, DRAWS))
             errors = noise[:, :, k] + sessions[:-1]
-            per_year[:, k] = course.line.combination(scatter)[1] @ errors
+            per_year[:, k] = course.model.combination(scatter)[1] @ errors
             at_once[:, k] += sessions[-2] - sessions[-1]
         drift = np.array([course.rate.per_year for course in history.courses])
         parts = weights * np.mean(at_once**2, axis=0)
-        dof = history.courses[0].line.dof * np.sum(parts) ** 2 / np.sum(parts**2)
+        freedom = np.array([course.model.dof for course in history.courses])
+        dof = np.sum(parts) ** 2 / np.sum(parts**2 / freedom)
         factor = np.sqrt(dof / rng.chisquare(dof, DRAWS))[:, None]
         return factor * at_once, factor * per_year - drift
 

@@ -9,7 +9,7 @@ import accelstudy as acs
 from accelstudy.adjustment.quality import POWER
 from accelstudy.campaign.format import write_campaign
 from accelstudy.epochs.congruence import LEVEL, Congruence
-from accelstudy.epochs.course import SURE, ParameterCourse
+from accelstudy.epochs.course import ParameterCourse
 
 N = 500
 STANDARD_ERRORS = 3.3
@@ -64,10 +64,15 @@ def test_intervals_hold_rate_and_scatter(sigmas, scatter):
 
 
 def test_a_step_is_no_drift_and_neither_drift_nor_scatter_is_a_step():
-    steps = [c.step for c in drawn(5, EQUAL, n=200, rate=40, course=DATES > -0.8)]
-    assert {(s.after, s.before, s.probability > SURE) for s in steps} == {(3, 4, True)}
-    held = np.mean([abs(s.size - 40) < 2.78 * s.sigma for s in steps])
-    assert held >= 0.95 - tolerance(0.05, 200)
+    courses = [*drawn(5, EQUAL, n=200, rate=40, course=DATES > -0.8)]
+    found = {
+        (c.step.after, c.step.before, "steps" in c.found, "drifts" in c.found) for c in courses
+    }
+    assert found == {(3, 4, True, False)}
+    within = [
+        (abs(c.step.size - 40) < 2.78 * c.step.sigma, np.prod(c.rate.ci95) < 0) for c in courses
+    ]
+    assert np.all(np.mean(within, axis=0) >= 0.95 - tolerance(0.05, 200))
     for steady in ({"rate": 4.0}, {"rate": 20.0}, {"scatter": 4.0}):
         assert sum("steps" in c.found for c in drawn(6, EQUAL, n=100, **steady)) <= 3
 

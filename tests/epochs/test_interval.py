@@ -79,13 +79,16 @@ def test_a_sensor_that_drifts_is_good_until_the_drift_is_as_large(session):
     """Without noise or scatter, the bias of x becomes a pitch by itself."""
     quiet = replace(session, covariance=1e-10 * session.covariance)
     dates = [datetime(2025, 1, 1) + timedelta(seconds=YEAR * years) for years in AT]
-    each = [
-        replace(quiet, parameters=session.parameters + 0.01 * years * np.eye(6)[0]) for years in AT
-    ]
-    history = History(each, dates, 1e-3)
+
+    def history_of(changes):
+        values = session.parameters + 0.01 * np.outer(changes, np.eye(6)[0])
+        return History([replace(quiet, parameters=each) for each in values], dates, 1e-3)
+
+    history = history_of(AT)
     interval = Interval(history, 0.01 / G * 2.5, CONFIDENCE)
     assert interval.years == pytest.approx(2.5, rel=5e-3)  # the scale of x is not 1
     after = datetime.fromisoformat(interval.until) - dates[-1]
     assert after.days == int(interval.years * YEAR / 86400)
     assert Interval(history, 0.01 / G * 20, CONFIDENCE).years == MAX_YEARS
+    assert Interval(history_of(AT > -1), 1e-6, CONFIDENCE).years == MAX_YEARS  # a step is no drift
     assert Interval(History([session] * 3, dates[:3], 1e-3), 1e-6, CONFIDENCE).years == 0
