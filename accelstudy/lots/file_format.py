@@ -85,11 +85,13 @@ class Odd(Part):
     campaign : its campaign
     posterior : probability that it is odd
     names : effects that it may have
+    by_size : whether the others have the effect, too, in another size
     """
 
     campaign: str
     posterior: float
     names: list[str]
+    by_size: bool
 
 
 class Each(Part):

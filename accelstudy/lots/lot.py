@@ -32,6 +32,7 @@ from accelstudy.lots.passes import (
     Alternative,
     LotEffect,
     Mapped,
+    OddSensor,
     Pass,
     SensorState,
     count_odd,
@@ -115,10 +116,10 @@ class LotDiagnosis:
         return next((one for one in self.passes if one.missing), self.passes[-1]).alternatives
 
     @cached_property
-    def odd(self) -> list[SensorState]:
+    def odd(self) -> list[OddSensor]:
         """Odd sensors, the surest first: by what the others lack, or by the size of an effect."""
         by_size = [
-            SensorState(self.evidence[i].campaign, one.names, float(one.apart[i]))
+            OddSensor(self.evidence[i].campaign, one.names, float(one.apart[i]), by_size=True)
             for one in self.effects
             for i in np.argsort(-one.apart, kind="stable")[: count_odd(one.apart)]
         ]

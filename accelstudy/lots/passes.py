@@ -92,8 +92,25 @@ class Alternative(NamedTuple):
     posterior: float
 
 
+class OddSensor(NamedTuple):
+    """A sensor that has an effect which the others do not have, or in another size.
+
+    Attributes
+    ----------
+    campaign : str
+    names : tuple of str, of that effect
+    posterior : float
+    by_size : bool, whether the others have the effect, too
+    """
+
+    campaign: str
+    names: tuple[str, ...]
+    posterior: float
+    by_size: bool = False
+
+
 class SensorState(NamedTuple):
-    """What the model lacks for a sensor, or what makes it odd, and how probable that is.
+    """What the model lacks for a sensor, and how probable that is.
 
     Attributes
     ----------
@@ -287,7 +304,7 @@ class Pass:
         return () if self.found is None else self.found.names
 
     @cached_property
-    def odd(self) -> list[SensorState]:
+    def odd(self) -> list[OddSensor]:
         """Odd sensors, the surest first; 5 of 100 are expected to be wrong."""
         names = [name for name in self.mixture.own if name not in self._named]
         own = np.array([self.mixture.own[n] + np.log(self.mixture.prior[n]) for n in names])
@@ -295,7 +312,7 @@ class Pass:
         posterior = self.posterior_odd
         order = np.argsort(-np.round(posterior, 3), kind="stable")[: count_odd(posterior)]
         return [
-            SensorState(
+            OddSensor(
                 self.evidence[i].campaign,
                 self.classes[names[own[:, i].argmax()]],
                 float(posterior[i]),
@@ -309,7 +326,7 @@ class Pass:
         return not_odd(self.evidence, self.odd)
 
 
-def not_odd(evidence: Sequence[SensorEvidence], odd: Iterable[SensorState]) -> list[int]:
+def not_odd(evidence: Sequence[SensorEvidence], odd: Iterable[OddSensor]) -> list[int]:
     """Numbers of the sensors that are not odd."""
     campaigns = {one.campaign for one in odd}
     return [i for i, each in enumerate(evidence) if each.campaign not in campaigns]

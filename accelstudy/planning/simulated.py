@@ -37,12 +37,12 @@ class SimulatedTilt:
     Attributes
     ----------
     statistics : CellStatistics
-    neglecting : Tilt, by linear theory, if the model neglects effects; sensors differ in these, and
-        one is simulated
+    over_sensors : Tilt, by linear theory, if the model neglects effects: sensors differ in these,
+        and one is simulated
     """
 
     statistics: CellStatistics
-    neglecting: Tilt | None = None
+    over_sensors: Tilt | None = None
 
     @property
     def rms(self) -> Array:
@@ -51,8 +51,8 @@ class SimulatedTilt:
 
     def quantile_of_both(self, probability: float) -> float:
         """Error that roll and pitch both stay below in this share of the calibrations, rad."""
-        if self.neglecting is not None:
-            return self.neglecting.quantile_of_both(probability)
+        if self.over_sensors is not None:
+            return self.over_sensors.quantile_of_both(probability)
         return float(self.statistics.quantile(TILT, BOTH, probability).value)
 
 
