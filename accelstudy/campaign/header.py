@@ -62,36 +62,39 @@ class LogLayout(ConfigSection):
     """Layout of a log: how `import` read its numbers, and `apply` reads them again.
 
     Scale and offset are in the order of the log's own axes, whatever its frame.
+
+    Attributes
+    ----------
+    columns : columns of fx, fy, fz, temperature and vibration: name, or place counted from 0
+    time : column of time
+    time_unit : unit of that column
+    rate : samples per second, without time
+    variable : which array of a MATLAB file, topic of a bag, or instance of a ULog
+    unit : unit of the forces
+    scale : with counts: m/s² per count
+    offset : with counts: reading at 0 m/s²
+    frame : where the axes x, y, z of the log point, as frd or flu
     """
 
     retired: ClassVar = {"delimiter": "it is told from the rows"}
 
-    columns: dict[str, Place] = Field(
-        {},
-        description="columns of fx, fy, fz, temperature and vibration: name, or place counted "
-        "from 0",
-    )
-    time: Place | None = Field(None, description="column of time")
+    columns: dict[str, Place] = Field({})
+    time: Place | None = None
     time_unit: Annotated[
         Literal["s", "ms", "us", "ns"], BeforeValidator(_usual_spelling(*CLOCK_UNITS))
-    ] = Field("s", description="unit of that column")
+    ] = "s"
     rate: Annotated[Rate | None, in_unit("Hz")] = Field(
         None,
         validation_alias=AliasChoices("rate", "rate_hz"),  # as 0.1 to 0.3 wrote it
-        description="samples per second, without time",
     )
-    variable: str | None = Field(
-        None, description="which array of a MATLAB file, topic of a bag, or instance of a ULog"
-    )
+    variable: str | None = None
     unit: Annotated[
         Literal["m/s^2", "g", "mg", "counts"],
         BeforeValidator(_usual_spelling(*SENSOR_UNITS, "counts")),
-    ] = Field("m/s^2", description="unit of the forces")
-    scale: OneOrMore[Finite] | None = Field(None, description="with counts: m/s² per count")
-    offset: OneOrMore[Finite] | None = Field(None, description="with counts: reading at 0 m/s²")
-    frame: Annotated[str, AfterValidator(lambda name: parse_frame(name).name)] = Field(
-        "frd", description="where the axes x, y, z of the log point, as frd or flu"
-    )
+    ] = "m/s^2"
+    scale: OneOrMore[Finite] | None = None
+    offset: OneOrMore[Finite] | None = None
+    frame: Annotated[str, AfterValidator(lambda name: parse_frame(name).name)] = "frd"
 
     @property
     def axes(self) -> Frame:
@@ -115,45 +118,66 @@ Calculable = Annotated[float, *bounds_of(Range(-MAX_VALUE, MAX_VALUE))]
 
 
 class Nominal(ConfigSection):
-    """Nominal conversion of counts: f = (raw − offset) · scale, m/s², per axis."""
+    """Nominal conversion of counts: f = (raw − offset) · scale, m/s², per axis.
 
-    scale: Annotated[list[Annotated[Calculable, AfterValidator(_not_zero)]], PerAxis] = Field(
-        description="m/s² per count, of x, y and z"
-    )
-    offset: Annotated[list[Calculable], PerAxis] = Field(
-        description="reading at 0 m/s², of x, y and z"
-    )
+    Attributes
+    ----------
+    scale : m/s² per count, of x, y and z
+    offset : reading at 0 m/s², of x, y and z
+    """
+
+    scale: Annotated[list[Annotated[Calculable, AfterValidator(_not_zero)]], PerAxis]
+    offset: Annotated[list[Calculable], PerAxis]
 
 
 class _Gravity(ConfigSection):
-    """Gravity where the sensor was."""
+    """Gravity where the sensor was.
 
-    value_mps2: Gravity = Field(description="local gravity")
-    sigma_mps2: SigmaGravity = Field(
-        0.0, description="its standard deviation; 0 holds it fixed in the adjustment"
-    )
+    Attributes
+    ----------
+    value_mps2 : local gravity
+    sigma_mps2 : its standard deviation; 0 holds it fixed in the adjustment
+    """
+
+    value_mps2: Gravity
+    sigma_mps2: SigmaGravity = 0.0
 
 
 class _SensorNoise(ConfigSection):
-    """A-priori noise of the sensor; without it the noise is estimated from the residuals."""
+    """A-priori noise of the sensor; without it the noise is estimated from the residuals.
 
-    sigma_mps2: SigmaForce = Field(description="standard deviation of a position mean, per axis")
-    degrees_of_freedom: Positive | None = Field(
-        None, description="of that sigma, where it is an estimate; without them it counts as known"
-    )
+    Attributes
+    ----------
+    sigma_mps2 : standard deviation of a position mean, per axis
+    degrees_of_freedom : of that sigma, where it is an estimate; without them it counts as known
+    """
+
+    sigma_mps2: SigmaForce
+    degrees_of_freedom: Positive | None = None
 
 
 class _Robot(ConfigSection):
-    """The robot, whose section stands in the header exactly if the table has its angles."""
+    """The robot, whose section stands in the header exactly if the table has its angles.
 
-    angle_sigma_mgon: SigmaAngle = Field(description="standard deviation of roll and of pitch")
+    Attributes
+    ----------
+    angle_sigma_mgon : standard deviation of roll and of pitch
+    """
+
+    angle_sigma_mgon: SigmaAngle
 
 
 class Exclusion(ConfigSection):
-    """A hold that is left out of every fit."""
+    """A hold that is left out of every fit.
 
-    position: Annotated[int, Field(ge=1), Number] = Field(description="number of the hold")
-    reason: Annotated[str, Field(min_length=1)] = Field(description="why it is left out")
+    Attributes
+    ----------
+    position : number of the hold
+    reason : why it is left out
+    """
+
+    position: Annotated[int, Field(ge=1), Number]
+    reason: Annotated[str, Field(min_length=1)]
 
 
 def _date(value: Any) -> Any:
@@ -165,25 +189,30 @@ def _date(value: Any) -> Any:
 
 
 class Header(ConfigSection):
-    """The content of `campaign.yaml`."""
+    """The content of `campaign.yaml`.
 
-    schema_version: Annotated[Literal[1], Number] = Field(description="of this format")
-    name: Annotated[str, Field(min_length=1)] = Field(description="of the campaign, any text")
-    sensor: str | None = Field(None, description="what was calibrated, any text")
-    date: Annotated[str, BeforeValidator(_date)] | None = Field(
-        None, description="when it was measured, as 2026-03-01 or 2026-03-01T14:00"
-    )
-    unit: Literal["m/s^2", "g", "mg", "counts"] = Field(
-        description="of the forces in the table; g is 9.80665 m/s²"
-    )
+    Attributes
+    ----------
+    schema_version : of this format
+    name : of the campaign, any text
+    sensor : what was calibrated, any text
+    date : when it was measured, as 2026-03-01 or 2026-03-01T14:00
+    unit : of the forces in the table; g is 9.80665 m/s²
+    range_mps2 : the sensor measures ± this; where it can saturate
+    resolution_mps2 : steps in which x, y and z are read; where rounding counts
+    """
+
+    schema_version: Annotated[Literal[1], Number]
+    name: Annotated[str, Field(min_length=1)]
+    sensor: str | None = None
+    date: Annotated[str, BeforeValidator(_date)] | None = None
+    unit: Literal["m/s^2", "g", "mg", "counts"]
     nominal: Nominal | None = None
     gravity: _Gravity
     sensor_noise: _SensorNoise | None = None
-    range_mps2: Annotated[Positive, Field(le=MAX_CELL)] | None = Field(
-        None, description="the sensor measures ± this; where it can saturate"
-    )
+    range_mps2: Annotated[Positive, Field(le=MAX_CELL)] | None = None
     resolution_mps2: Annotated[list[Annotated[NotNegative, Field(le=MAX_CELL)]], PerAxis] | None = (
-        Field(None, description="steps in which x, y and z are read; where rounding counts")
+        None
     )
     excluded: Annotated[list[Exclusion], Field(min_length=1)] | None = None
     robot: _Robot | None = None

@@ -27,17 +27,25 @@ MIN_POLE_DISTANCE = 1e-4
 
 
 class ReferenceSensor(ConfigSection):
-    """A reference sensor, whose roll and pitch stand in the table of positions."""
+    """A reference sensor, whose roll and pitch stand in the table of positions.
 
-    calibration: str = Field(description="campaign of its calibration")
-    frame: Annotated[str, AfterValidator(lambda name: parse_frame(name).name)] = Field(
-        description="where its axes x, y and z point, in the axes of the sensor: frd if they are "
-        "the same up to a small rotation"
-    )
-    sigma_mps2: SigmaForce = Field(description="standard deviation of its mean in a hold, per axis")
-    effects: Annotated[list[str], Field(min_length=1)] = Field(description="its model")
-    parameters: list[Finite] = Field(description="its calibration, SI")
-    covariance: list[list[Finite]] = Field(description="covariance matrix of the parameters, SI")
+    Attributes
+    ----------
+    calibration : campaign of its calibration
+    frame : where its axes x, y and z point, in the axes of the sensor: frd if they are the same
+        up to a small rotation
+    sigma_mps2 : standard deviation of its mean in a hold, per axis
+    effects : its model
+    parameters : its calibration, SI
+    covariance : covariance matrix of the parameters, SI
+    """
+
+    calibration: str
+    frame: Annotated[str, AfterValidator(lambda name: parse_frame(name).name)]
+    sigma_mps2: SigmaForce
+    effects: Annotated[list[str], Field(min_length=1)]
+    parameters: list[Finite]
+    covariance: list[list[Finite]]
 
     @model_validator(mode="after")
     def _whole(self) -> Self:

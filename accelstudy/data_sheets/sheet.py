@@ -19,7 +19,7 @@ from accelstudy.basics.units import (
     recorded_unit,
     to_recorded,
 )
-from accelstudy.files.documents import ITEM
+from accelstudy.files.validation import ITEM
 from accelstudy.pages.result import Result
 
 if TYPE_CHECKING:

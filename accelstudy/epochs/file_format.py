@@ -113,6 +113,7 @@ class Parameter(Part):
     detectable : steady change from the first to the last calibration that is found in 80 of 100
         cases
     found : what it does; changed if a drift and scatter cannot be distinguished
+    or_ : parameters that may have changed instead of it
     rate : null of two calibrations
     scatter : null of two calibrations
     step : null of fewer than four calibrations
@@ -126,9 +127,7 @@ class Parameter(Part):
     sigma: float | None = None
     detectable: float | None = None
     found: list[Literal["steps", "drifts", "scatters", "changed"]] = Field([])
-    or_: list[str] = Field(
-        [], alias="or", description="parameters that may have changed instead of it"
-    )
+    or_: list[str] = Field([], alias="or")
     rate: Rate | None
     scatter: Scatter | None
     step: Step | None = None

@@ -2,40 +2,27 @@
 
 from __future__ import annotations
 
-import inspect
 import json
 import os
-import re
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Annotated, Any, ClassVar, Literal, Self
 
 import numpy as np
-from pydantic import BaseModel, ConfigDict
+from pydantic import ConfigDict
 
 from accelstudy.files.outputs import whole_file
 from accelstudy.files.reading import read_json
-from accelstudy.files.validation import Number, validate
-
-ITEM = re.compile(r"^(\w+) : (.+(?:\n {4}.+)*)", re.MULTILINE)
-"""Name and meaning of an attribute in a docstring."""
+from accelstudy.files.validation import Described, Number, validate
 
 
-class Part(BaseModel):
+class Part(Described):
     """A part of a document; keys of later versions are kept as they are.
 
-    What its docstring says of attributes describes the keys, on pages and in the JSON Schema. It is
-    made of a mapping, or of an object with these attributes.
+    It is made of a mapping, or of an object with these attributes.
     """
 
     model_config = ConfigDict(extra="allow", from_attributes=True)
-
-    @classmethod
-    def __pydantic_init_subclass__(cls, **settings: Any) -> None:
-        super().__pydantic_init_subclass__(**settings)
-        for name, meaning in ITEM.findall(inspect.cleandoc(cls.__doc__ or "")):
-            cls.model_fields[name].description = " ".join(meaning.split())
-        cls.model_rebuild(force=True)
 
 
 class Document(Part):

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import inspect
 import json
 import math
+import re
 from collections.abc import Mapping
 from datetime import date
 from difflib import get_close_matches
@@ -149,11 +151,33 @@ WORDS = {
 """What would be right, by the type of pydantic's error; two types have a text of their own."""
 
 
+ITEM = re.compile(r"^(\w+) : (.+(?:\n {4}.+)*)", re.MULTILINE)
+"""Name and meaning of an attribute in a docstring."""
+
+
 class KeyProblem(ValueError):
     """What is wrong with a key of a section, which the message begins with."""
 
 
-class ConfigSection(BaseModel):
+class Described(BaseModel):
+    """A model whose docstring says what its keys mean, on pages and in the JSON Schema."""
+
+    @classmethod
+    def __get_pydantic_json_schema__(
+        cls, core: core_schema.CoreSchema, handler: JsonHandler
+    ) -> dict[str, Any]:
+        """JSON Schema with the head of the docstring, and the meaning of each key."""
+        schema = handler.resolve_ref_schema(handler(core))
+        for one in reversed(cls.__mro__[: cls.__mro__.index(Described)]):
+            text, _, attributes = inspect.cleandoc(one.__doc__ or "").partition("\n\nAttributes\n")
+            schema["description"] = text
+            for name, meaning in ITEM.findall(attributes):
+                key = cls.model_fields[name].alias or name
+                schema["properties"][key]["description"] = " ".join(meaning.split())
+        return schema
+
+
+class ConfigSection(Described):
     """A part of the configuration; unknown keys are errors."""
 
     model_config = ConfigDict(extra="forbid", frozen=True, strict=False)
@@ -178,16 +202,18 @@ class ConfigSection(BaseModel):
 
 
 class Configuration(ConfigSection):
-    """A whole configuration, whose plug-ins are loaded before its other keys are read."""
+    """A whole configuration, whose plug-ins are loaded before its other keys are read.
+
+    Attributes
+    ----------
+    plugins : Python files with effects, schemes and the like of your own, from the folder in
+        which the workflow runs
+    """
 
     plugins: Annotated[
         list[str],
         BeforeValidator(_plugin_names, json_schema_input_type=str | list[str] | dict[str, str]),
-    ] = Field(
-        default=[],
-        description="Python files with effects, schemes and the like of your own, from the folder "
-        "in which the workflow runs",
-    )
+    ] = Field(default=[])
 
     @model_validator(mode="before")
     @classmethod

@@ -31,14 +31,20 @@ Direction = Annotated[list[Component], Field(min_length=3, max_length=3), AfterV
 
 
 class SchemeFile(ConfigSection):
-    """The content of a file: directions of gravity in the body frame, of any length."""
+    """The content of a file: directions of gravity in the body frame, of any length.
+
+    Attributes
+    ----------
+    positions : attitudes, for people; not read
+    design : how it was designed, for people; not read
+    """
 
     directions: Annotated[list[Direction], Field(min_length=1)]
     scheme: PathName | None = None
     title: str | None = None
     source: str | None = None
-    positions: Any = Field(None, description="attitudes, for people; not read")
-    design: Any = Field(None, description="how it was designed, for people; not read")
+    positions: Any = None
+    design: Any = None
 
 
 def parse_scheme(content: Mapping[str, Any], name: str, source: str | Path = "scheme") -> Scheme:

@@ -211,43 +211,59 @@ Simulated = Annotated[SensorModel | None, _written(OneOrMore[str], _simulated, _
 
 
 class SensorNoise(ConfigSection):
-    """White noise of the accelerometer."""
+    """White noise of the accelerometer.
+
+    Attributes
+    ----------
+    sigma_mps2 : standard deviation of the mean of a position, per axis, m/s²
+    """
 
     retired = {  # noqa: RUF012
         "per": "sigma_mps2 is that of a position's mean, σ/√n of n samples: leave out per, rate_hz "
         "and duration_s"
     }
 
-    sigma_mps2: kinds.SigmaForce = Field(
-        0.002, description="standard deviation of the mean of a position, per axis, m/s²"
-    )
+    sigma_mps2: kinds.SigmaForce = 0.002
 
 
 class RobotNoise(ConfigSection):
-    """Noise of the robot's angles."""
+    """Noise of the robot's angles.
 
-    sigma_mgon: kinds.SigmaAngle = Field(3.2, description="standard deviation of roll and of pitch")
+    Attributes
+    ----------
+    sigma_mgon : standard deviation of roll and of pitch
+    """
+
+    sigma_mgon: kinds.SigmaAngle = 3.2
 
 
 class GravityNoise(ConfigSection):
-    """What is known of local gravity."""
+    """What is known of local gravity.
 
-    sigma_mps2: kinds.SigmaGravity = Field(
-        0.0, description="standard deviation of the value used; 0 holds it fixed in the adjustment"
-    )
-    error_mps2: kinds.GravityError = Field(0.0, description="systematic error of the value used")
+    Attributes
+    ----------
+    sigma_mps2 : standard deviation of the value used; 0 holds it fixed in the adjustment
+    error_mps2 : systematic error of the value used
+    """
+
+    sigma_mps2: kinds.SigmaGravity = 0.0
+    error_mps2: kinds.GravityError = 0.0
 
 
 class NoiseConfig(ConfigSection):
-    """The stochastic model of all cells, except where a grid gives other values."""
+    """The stochastic model of all cells, except where a grid gives other values.
+
+    Attributes
+    ----------
+    effects : noise effects of the forces, e.g. heavy_tails(nu=3), in the order in which they
+        act; the calibration ignores them
+    """
 
     sensor: SensorNoise = SensorNoise()
     robot: RobotNoise = RobotNoise()
     gravity: GravityNoise = GravityNoise()
     effects: Annotated[list[NoiseEffect], _written(list[str], _noise_effects, _specs)] = Field(
-        default_factory=list,
-        description="noise effects of the forces, e.g. heavy_tails(nu=3), in the order in which "
-        "they act; the calibration ignores them",
+        default_factory=list
     )
 
     @property
@@ -262,26 +278,35 @@ class NoiseConfig(ConfigSection):
 
 
 class HoldPlanConfig(ConfigSection):
-    """Conditions of the holds, on which some effects depend."""
+    """Conditions of the holds, on which some effects depend.
 
-    interval_s: kinds.Interval | None = Field(None, description="time between holds")
-    temperature_degC: tuple[kinds.Temperature, kinds.Temperature] | None = Field(
-        None, description="temperatures from and to"
-    )
-    temperature_order: Literal["linear", "ABBA", "random"] = Field(
-        "linear", description="course of the temperature; ABBA: in quarters of the session"
-    )
-    vibration_mps2: tuple[kinds.Vibration, kinds.Vibration] | None = Field(
-        None, description="rms of the vibration, drawn for each hold between these"
-    )
-    yaw: Literal["none", "random"] = Field("none", description="yaw of the robot: zero, or drawn")
+    Attributes
+    ----------
+    interval_s : time between holds
+    temperature_degC : temperatures from and to
+    temperature_order : course of the temperature; ABBA: in quarters of the session
+    vibration_mps2 : rms of the vibration, drawn for each hold between these
+    yaw : yaw of the robot: zero, or drawn
+    """
+
+    interval_s: kinds.Interval | None = None
+    temperature_degC: tuple[kinds.Temperature, kinds.Temperature] | None = None
+    temperature_order: Literal["linear", "ABBA", "random"] = "linear"
+    vibration_mps2: tuple[kinds.Vibration, kinds.Vibration] | None = None
+    yaw: Literal["none", "random"] = "none"
 
 
 class Quantity(ConfigSection):
-    """True values of the parameters of one effect."""
+    """True values of the parameters of one effect.
 
-    value: OneOrMore[kinds.Finite] = Field(description="one number per parameter of the effect")
-    unit: str = Field(description="unit of the values, e.g. mgon, ppm, m/s^2")
+    Attributes
+    ----------
+    value : one number per parameter of the effect
+    unit : unit of the values, e.g. mgon, ppm, m/s^2
+    """
+
+    value: OneOrMore[kinds.Finite]
+    unit: str
 
     def in_si(self, effect: Effect) -> dict[str, float]:
         """The values by the names of the parameters of the effect, SI."""
@@ -296,29 +321,28 @@ class Quantity(ConfigSection):
 
 
 class Grid(ConfigSection):
-    """Cells: every combination of what is listed. A single value may stand for a list of one."""
+    """Cells: every combination of what is listed. A single value may stand for a list of one.
 
-    models: Models = Field(
-        description="models: names, compositions as bias-scale+warm_up(tau=300), YAML files with a "
-        "model; or all"
-    )
-    schemes: Schemes = Field(
-        description="schemes: names, YAML files as `accelstudy design` writes them; or all"
-    )
+    Attributes
+    ----------
+    models : models: names, compositions as bias-scale+warm_up(tau=300), YAML files with a
+        model; or all
+    schemes : schemes: names, YAML files as `accelstudy design` writes them; or all
+    replicates : simulated calibrations per cell
+    sensor_sigma_mps2 : noise.sensor.sigma_mps2
+    robot_sigma_mgon : noise.robot.sigma_mgon
+    gravity_sigma_mps2 : noise.gravity.sigma_mps2
+    gravity_error_mps2 : noise.gravity.error_mps2
+    """
+
+    models: Models
+    schemes: Schemes
     approaches: Approaches
-    replicates: kinds.Replicates = Field(description="simulated calibrations per cell")
-    sensor_sigma_mps2: OneOrMore[kinds.SigmaForce] | None = Field(
-        None, description="noise.sensor.sigma_mps2"
-    )
-    robot_sigma_mgon: OneOrMore[kinds.SigmaAngle] | None = Field(
-        None, description="noise.robot.sigma_mgon"
-    )
-    gravity_sigma_mps2: OneOrMore[kinds.SigmaGravity] | None = Field(
-        None, description="noise.gravity.sigma_mps2"
-    )
-    gravity_error_mps2: OneOrMore[kinds.GravityError] | None = Field(
-        None, description="noise.gravity.error_mps2"
-    )
+    replicates: kinds.Replicates
+    sensor_sigma_mps2: OneOrMore[kinds.SigmaForce] | None = None
+    robot_sigma_mgon: OneOrMore[kinds.SigmaAngle] | None = None
+    gravity_sigma_mps2: OneOrMore[kinds.SigmaGravity] | None = None
+    gravity_error_mps2: OneOrMore[kinds.GravityError] | None = None
 
     def lists(self, usual: Mapping[str, float]) -> list[list[Any]]:
         """Models, schemes, approaches, and values of the settings of the noise, in their order."""
@@ -333,34 +357,39 @@ class Grid(ConfigSection):
 
 
 class LevelingConfig(ConfigSection):
-    """Where the tilt error that a calibration leaves is evaluated."""
+    """Where the tilt error that a calibration leaves is evaluated.
 
-    max_tilt_gon: kinds.Tilt = Field(
-        MAX_TILT_GON, description="largest tilt of the z axis from the vertical"
-    )
-    attitudes: kinds.Attitudes = Field(
-        ATTITUDES, description="least number of attitudes, spread evenly over these tilts"
-    )
+    Attributes
+    ----------
+    max_tilt_gon : largest tilt of the z axis from the vertical
+    attitudes : least number of attitudes, spread evenly over these tilts
+    """
+
+    max_tilt_gon: kinds.Tilt = MAX_TILT_GON
+    attitudes: kinds.Attitudes = ATTITUDES
 
 
 class SensitivityConfig(ConfigSection):
-    """Variance-based sensitivity analysis of leveling (figures 4 to 6)."""
+    """Variance-based sensitivity analysis of leveling (figures 4 to 6).
+
+    Attributes
+    ----------
+    base_samples : Sobol base samples, a power of two
+    roll_gon : rolls of the grid
+    pitch_gon : pitches of the grid
+    model : model of figures 5 and 6
+    scheme : scheme whose calibration gives the sds
+    """
 
     retired = {  # noqa: RUF012
         "resamples": "intervals follow from the scatter of the samples: leave it out"
     }
 
-    base_samples: kinds.BaseSamples = Field(1024, description="Sobol base samples, a power of two")
-    roll_gon: OneOrMore[kinds.Angle] = Field(description="rolls of the grid")
-    pitch_gon: OneOrMore[kinds.Pitch] = Field(description="pitches of the grid")
-    model: Annotated[SensorModel, _one(_model)] = Field(
-        NINE, validate_default=True, description="model of figures 5 and 6"
-    )
-    scheme: Annotated[Scheme, _one(get_scheme)] = Field(
-        "mclaren-24",
-        validate_default=True,
-        description="scheme whose calibration gives the sds",
-    )
+    base_samples: kinds.BaseSamples = 1024
+    roll_gon: OneOrMore[kinds.Angle]
+    pitch_gon: OneOrMore[kinds.Pitch]
+    model: Annotated[SensorModel, _one(_model)] = Field(NINE, validate_default=True)
+    scheme: Annotated[Scheme, _one(get_scheme)] = Field("mclaren-24", validate_default=True)
 
     def cell(self, approach: str, scheme: str = "") -> str:
         """Name of the cell of an approach, in the scheme of the analysis if no other is named."""
@@ -411,7 +440,25 @@ HOLD_KEYS = {
 
 
 class Study(Configuration):
-    """A study."""
+    """A study.
+
+    Attributes
+    ----------
+    study : name; results go to results/<study>/
+    seed : seed of all random numbers
+    gravity_mps2 : true local gravity
+    sensor : true parameters of the simulated sensor, by effect: its name, or its name with
+        settings
+    simulated_effects : effects that the simulated sensor has: model, for those of the cell's
+        model, or a list
+    models : models of your own: name and effects
+    grids : sets of cells
+    sensitivity : figures 4 to 6
+    angle_unit : unit of angles in figures, gon or deg; without it the environment variable
+        ACCELSTUDY_ANGLE_UNIT says, else gon. Tables keep their units
+    paper : draw the paper's figures and judge its claims; needs `sensitivity`, and the cells of
+        its model and scheme with both approaches
+    """
 
     retired = {  # noqa: RUF012
         "keep": "every calibration is stored in estimates/: leave it out",
@@ -423,40 +470,22 @@ class Study(Configuration):
     }
 
     study: Annotated[str, AfterValidator(_name)] = Field(
-        description="name; results go to results/<study>/",
-        json_schema_extra={"pattern": f"^{_NAME}$", "maxLength": MAX_NAME_BYTES},
+        json_schema_extra={"pattern": f"^{_NAME}$", "maxLength": MAX_NAME_BYTES}
     )
-    seed: kinds.Seed = Field(description="seed of all random numbers")
-    gravity_mps2: kinds.Gravity = Field(STANDARD_GRAVITY, description="true local gravity")
+    seed: kinds.Seed
+    gravity_mps2: kinds.Gravity = STANDARD_GRAVITY
     noise: NoiseConfig = NoiseConfig()
     holds: HoldPlanConfig = HoldPlanConfig()
-    sensor: dict[str, Quantity] = Field(
-        default_factory=dict,
-        description="true parameters of the simulated sensor, by effect: its name, or its name "
-        "with settings",
-    )
-    simulated_effects: Simulated = Field(
-        default=["model"],
-        validate_default=True,
-        description="effects that the simulated sensor has: model, for those of the cell's model, "
-        "or a list",
-    )
+    sensor: dict[str, Quantity] = Field(default_factory=dict)
+    simulated_effects: Simulated = Field(default=["model"], validate_default=True)
     models: dict[Annotated[str, AfterValidator(_own_name)], Composition] = Field(
-        default_factory=dict, description="models of your own: name and effects"
+        default_factory=dict
     )
-    grids: list[Grid] = Field(description="sets of cells", min_length=1)
+    grids: list[Grid] = Field(min_length=1)
     leveling: LevelingConfig = LevelingConfig()
-    sensitivity: SensitivityConfig | None = Field(None, description="figures 4 to 6")
-    angle_unit: Literal["gon", "deg"] | None = Field(
-        None,
-        description="unit of angles in figures, gon or deg; without it the environment variable "
-        "ACCELSTUDY_ANGLE_UNIT says, else gon. Tables keep their units",
-    )
-    paper: bool = Field(
-        False,
-        description="draw the paper's figures and judge its claims; needs `sensitivity`, and the "
-        "cells of its model and scheme with both approaches",
-    )
+    sensitivity: SensitivityConfig | None = None
+    angle_unit: Literal["gon", "deg"] | None = None
+    paper: bool = False
 
     @field_validator("models")
     @classmethod

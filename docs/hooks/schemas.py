@@ -59,9 +59,8 @@ def _anchor(path):
 
 
 def _sentence(block):
-    """What a block says of itself, without the sections of a docstring."""
-    text = re.split(r"\n\n(?:Parameters|Attributes)\n", block.get("description", ""))[0]
-    return plain(" ".join(text.split()))
+    """What a block says of itself."""
+    return plain(" ".join(block.get("description", "").split()))
 
 
 def _default(value, required):

@@ -25,32 +25,43 @@ FEWEST = 5  # redundancy of a log, below which nothing is put into it
 
 
 class Log(ConfigSection):
-    """A public log, and what is true of it as it is."""
+    """A public log, and what is true of it as it is.
 
-    model: ModelName | None = Field(None, description="model, by default that of the study")
-    own: list[str] = Field([], description="names of an effect that it has by itself, any of them")
-    note: str = Field(description="what is true of it, as the score shall say")
+    Attributes
+    ----------
+    model : model, by default that of the study
+    own : names of an effect that it has by itself, any of them
+    note : what is true of it, as the score shall say
+    """
+
+    model: ModelName | None = None
+    own: list[str] = Field([])
+    note: str
 
 
 class RealNoiseConfig(Study):
-    """A study with real noise; results go to ``results/<study>``."""
+    """A study with real noise; results go to ``results/<study>``.
+
+    Attributes
+    ----------
+    public_folder : where the logs are, or are downloaded to
+    interval_s : from one position to the next, where a log has no time
+    logs : public data by name
+    sizes : noncentralities λ
+    effects : what is put in: one effect, or two as a+b
+    nothing : campaigns of each log into which nothing is put: the first as the log is, the
+        others with a temperature (and a time) recorded that does nothing
+    """
 
     score: ClassVar = "real"
     baselines_every: ClassVar = 0
 
-    public_folder: str = Field(
-        "resources/public", description="where the logs are, or are downloaded to"
-    )
-    interval_s: Positive = Field(
-        30.0, description="from one position to the next, where a log has no time"
-    )
-    logs: dict[PathName, Log] = Field(min_length=1, description="public data by name")
-    sizes: OneOrMore[Positive] = Field(description="noncentralities λ")
-    effects: OneOrMore[str] = Field(description="what is put in: one effect, or two as a+b")
-    nothing: Replicates = Field(
-        description="campaigns of each log into which nothing is put: the first as the log is, the "
-        "others with a temperature (and a time) recorded that does nothing"
-    )
+    public_folder: str = "resources/public"
+    interval_s: Positive = 30.0
+    logs: dict[PathName, Log] = Field(min_length=1)
+    sizes: OneOrMore[Positive]
+    effects: OneOrMore[str]
+    nothing: Replicates
 
     _opened: dict[str, Donor] = PrivateAttr(default_factory=dict)
 

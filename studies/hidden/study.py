@@ -89,40 +89,72 @@ Row = dict[str, Any]
 
 
 class Nothing(ConfigSection):
-    """Campaigns in which nothing is missing."""
+    """Campaigns in which nothing is missing.
 
-    campaigns: Replicates = Field(description="in all")
+    Attributes
+    ----------
+    campaigns : in all
+    """
+
+    campaigns: Replicates
 
 
 class Kinds(ConfigSection):
-    """Campaigns with one thing each that has no size: wrong noise, gross or invisible."""
+    """Campaigns with one thing each that has no size: wrong noise, gross or invisible.
 
-    kinds: OneOrMore[str] = Field(["all"], description="names, or all")
-    campaigns: Replicates = Field(description="of each kind")
+    Attributes
+    ----------
+    kinds : names, or all
+    campaigns : of each kind
+    """
+
+    kinds: OneOrMore[str] = Field(["all"])
+    campaigns: Replicates
 
 
 class Sized(ConfigSection):
-    """Campaigns with one thing each, in several sizes."""
+    """Campaigns with one thing each, in several sizes.
 
-    kinds: OneOrMore[str] = Field(["all"], description="names, or all")
-    sizes: OneOrMore[Positive] = Field(description="noncentralities λ")
-    campaigns: Replicates = Field(description="of each kind and size")
+    Attributes
+    ----------
+    kinds : names, or all
+    sizes : noncentralities λ
+    campaigns : of each kind and size
+    """
+
+    kinds: OneOrMore[str] = Field(["all"])
+    sizes: OneOrMore[Positive]
+    campaigns: Replicates
 
 
 class Several(ConfigSection):
-    """Campaigns with two or three effects each."""
+    """Campaigns with two or three effects each.
 
-    sizes: OneOrMore[Positive] = Field(description="noncentralities λ, of each effect")
-    campaigns: Replicates = Field(description="of each size, each with effects at random")
+    Attributes
+    ----------
+    sizes : noncentralities λ, of each effect
+    campaigns : of each size, each with effects at random
+    """
+
+    sizes: OneOrMore[Positive]
+    campaigns: Replicates
 
 
 class Study(ConfigSection):
-    """What both studies have: which campaigns they make, how, and how they are diagnosed."""
+    """What both studies have: which campaigns they make, how, and how they are diagnosed.
 
-    study: PathName = Field(description="name; results go to results/<study>/")
-    seed: Seed = Field(description="of all that is random")
-    model: KnownModel = Field("bias-scale-nonorthogonality", description="model that is diagnosed")
-    diagnosis_seed: Seed = Field(1, description="of each diagnosis, as the option --seed")
+    Attributes
+    ----------
+    study : name; results go to results/<study>/
+    seed : of all that is random
+    model : model that is diagnosed
+    diagnosis_seed : of each diagnosis, as the option --seed
+    """
+
+    study: PathName
+    seed: Seed
+    model: KnownModel = "bias-scale-nonorthogonality"
+    diagnosis_seed: Seed = 1
 
     @property
     def fingerprint(self) -> str:
@@ -131,33 +163,43 @@ class Study(ConfigSection):
 
 
 class HiddenConfig(Study):
-    """A study of hidden effects; results go to ``results/<study>``."""
+    """A study of hidden effects; results go to ``results/<study>``.
+
+    Attributes
+    ----------
+    designs : sessions that are simulated, or all
+    approaches : gravity, robot, or all
+    sigma : whether a campaign says how large its noise is
+    baselines_every : of each kind and size every so many campaigns get to the simpler methods
+    nothing : nothing is missing
+    noise : only the noise is not as it is said to be
+    one : one effect of the catalogue
+    two : two effects of the catalogue
+    three : three that are easily distinguished
+    removed : one effect whose family the diagnosis does not know
+    outside : physics that was never in the catalogue
+    unforeseen : the same, invented when what can be learned was fixed
+    gross : gross errors
+    invisible : effects that the session cannot show
+    """
 
     score: ClassVar = "score"
     logs: ClassVar[Mapping[str, Any]] = {}
 
-    designs: OneOrMore[str] = Field(["all"], description="sessions that are simulated, or all")
-    approaches: OneOrMore[str] = Field(["all"], description="gravity, robot, or all")
-    sigma: OneOrMore[Literal["given", "not given"]] = Field(
-        default=["given", "not given"], description="whether a campaign says how large its noise is"
-    )
-    baselines_every: Annotated[int, Field(ge=1)] = Field(
-        20, description="of each kind and size every so many campaigns get to the simpler methods"
-    )
-    nothing: Nothing | None = Field(None, description="nothing is missing")
-    noise: Kinds | None = Field(None, description="only the noise is not as it is said to be")
-    one: Sized | None = Field(None, description="one effect of the catalogue")
-    two: Several | None = Field(None, description="two effects of the catalogue")
-    three: Several | None = Field(None, description="three that are easily distinguished")
-    removed: Sized | None = Field(
-        None, description="one effect whose family the diagnosis does not know"
-    )
-    outside: Sized | None = Field(None, description="physics that was never in the catalogue")
-    unforeseen: Sized | None = Field(
-        None, description="the same, invented when what can be learned was fixed"
-    )
-    gross: Kinds | None = Field(None, description="gross errors")
-    invisible: Kinds | None = Field(None, description="effects that the session cannot show")
+    designs: OneOrMore[str] = Field(["all"])
+    approaches: OneOrMore[str] = Field(["all"])
+    sigma: OneOrMore[Literal["given", "not given"]] = Field(default=["given", "not given"])
+    baselines_every: Annotated[int, Field(ge=1)] = 20
+    nothing: Nothing | None = None
+    noise: Kinds | None = None
+    one: Sized | None = None
+    two: Several | None = None
+    three: Several | None = None
+    removed: Sized | None = None
+    outside: Sized | None = None
+    unforeseen: Sized | None = None
+    gross: Kinds | None = None
+    invisible: Kinds | None = None
 
     @model_validator(mode="after")
     def _names_exist(self) -> Self:

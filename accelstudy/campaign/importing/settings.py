@@ -40,7 +40,25 @@ def _parse_exclusions(texts: Any) -> Any:
 
 
 class ImportSettings(LogLayout):
-    """How a log is read, and what the campaign gets from it."""
+    """How a log is read, and what the campaign gets from it.
+
+    Attributes
+    ----------
+    means : the file is a table of means already
+    block : samples of each position, in a log without the moves between them
+    name : name of the campaign; that of the file if absent
+    sensor : what was calibrated
+    gravity : local gravity, m/s²
+    gravity_sigma : its standard deviation; 0 holds it fixed
+    robot_sigma : with means: standard deviation of the robot's roll and pitch, rad
+    robot_unit : unit of these angles
+    range : the sensor measures ± this
+    window : length of the sliding window; 1 s, or 9 samples if these last longer
+    threshold : sd of a window at rest; chosen from the data if absent
+    trim : cut from both ends of a hold
+    shortest : shortest hold
+    exclude : holds to leave out, and why, as 13:moved or 13,14:somebody passed
+    """
 
     retired: ClassVar = {
         **LogLayout.retired,
@@ -55,36 +73,20 @@ class ImportSettings(LogLayout):
         "sensors": "import each of them by its `columns`, with a `name` of its own",
     }
 
-    means: bool = Field(False, description="the file is a table of means already")
-    block: int | None = Field(
-        None, ge=4, description="samples of each position, in a log without the moves between them"
-    )
-    name: str | None = Field(None, description="name of the campaign; that of the file if absent")
-    sensor: str | None = Field(None, description="what was calibrated")
-    gravity: Annotated[Gravity, in_unit("m/s^2")] = Field(
-        STANDARD_GRAVITY, description="local gravity, m/s²"
-    )
-    gravity_sigma: Annotated[SigmaGravity, in_unit("m/s^2")] = Field(
-        0.0, description="its standard deviation; 0 holds it fixed"
-    )
-    robot_sigma: Annotated[NotNegative, Field(lt=6.3), in_unit("rad")] | None = Field(
-        None, description="with means: standard deviation of the robot's roll and pitch, rad"
-    )
-    robot_unit: Literal["gon", "deg", "rad"] = Field("gon", description="unit of these angles")
-    range: Force | None = Field(None, description="the sensor measures ± this")
-    window: Annotated[Positive, in_unit("s")] | None = Field(
-        None, description="length of the sliding window; 1 s, or 9 samples if these last longer"
-    )
-    threshold: Force | None = Field(
-        None, description="sd of a window at rest; chosen from the data if absent"
-    )
-    trim: Annotated[NotNegative, in_unit("s")] = Field(
-        0.2, description="cut from both ends of a hold"
-    )
-    shortest: Annotated[Positive, in_unit("s")] = Field(1.0, description="shortest hold")
-    exclude: Annotated[dict[int, str], BeforeValidator(_parse_exclusions)] = Field(
-        {}, description="holds to leave out, and why, as 13:moved or 13,14:somebody passed"
-    )
+    means: bool = False
+    block: int | None = Field(None, ge=4)
+    name: str | None = None
+    sensor: str | None = None
+    gravity: Annotated[Gravity, in_unit("m/s^2")] = STANDARD_GRAVITY
+    gravity_sigma: Annotated[SigmaGravity, in_unit("m/s^2")] = 0.0
+    robot_sigma: Annotated[NotNegative, Field(lt=6.3), in_unit("rad")] | None = None
+    robot_unit: Literal["gon", "deg", "rad"] = "gon"
+    range: Force | None = None
+    window: Annotated[Positive, in_unit("s")] | None = None
+    threshold: Force | None = None
+    trim: Annotated[NotNegative, in_unit("s")] = 0.2
+    shortest: Annotated[Positive, in_unit("s")] = 1.0
+    exclude: Annotated[dict[int, str], BeforeValidator(_parse_exclusions)] = Field({})
 
     @property
     def layout(self) -> dict[str, Any]:
