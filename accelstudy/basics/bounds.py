@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from accelstudy.basics.errors import InputError
+from accelstudy.basics.errors import InputError, at
 
 
 @dataclass(frozen=True)
@@ -37,10 +37,8 @@ class Range:
 
     def check_key(self, key: str, value: float) -> None:
         """Check the value of a key, which the error names."""
-        try:
+        with at(key):
             self.check(value)
-        except InputError as error:
-            raise InputError(f"{key}: {error}") from None
 
 
 def _plain(value: float) -> str:

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-import difflib
 import re
 import reprlib
 import unicodedata
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Iterator, Mapping
+from contextlib import contextmanager
 from contextvars import ContextVar
+from difflib import get_close_matches
 
 OPTIONS: ContextVar[Mapping[str, str] | None] = ContextVar("options", default=None)
 """Options of the command that runs, by the keywords that they are; None in a program."""
@@ -37,6 +38,20 @@ class InputError(ValueError):
 
     def __init__(self, message: str) -> None:
         super().__init__(printable(for_user(message)))
+
+
+@contextmanager
+def at(place: object) -> Iterator[None]:
+    """Begin the message of an `InputError` within a ``with`` block with the place of the error."""
+    try:
+        yield
+    except InputError as error:
+        raise InputError(f"{place}: {error}") from None
+
+
+def reason_of(error: OSError) -> str:
+    """Return the reason that the system gives; Arrow puts more before it."""
+    return str(error.strerror or error).rpartition("] ")[2]
 
 
 def printable(text: str) -> str:
@@ -73,11 +88,17 @@ def brief(value: object) -> str:
     return text if len(text) <= 80 else f"{text[:80]} …"
 
 
+def did_you_mean(name: object, known: Iterable[str]) -> str:
+    """Say which of the known names may be meant, whatever its case; empty if none is near."""
+    lower = {each.lower(): each for each in known}
+    near = get_close_matches(name[:100].lower() if isinstance(name, str) else "", lower, n=1)
+    return f"; did you mean {lower[near[0]]!r}?" if near else ""
+
+
 class UnknownNameError(InputError):
     """A name that no registry has; the message lists those that there are, and `more` to know."""
 
     def __init__(self, kind: str, name: object, known: Iterable[str], more: str = "") -> None:
         known = tuple(known)
-        near = difflib.get_close_matches(name[:100] if isinstance(name, str) else "", known, n=1)
-        hint = f"; did you mean {near[0]!r}?" if near else ""
+        hint = did_you_mean(name, known)
         super().__init__(f"unknown {kind} {brief(name)}{hint} (known: {', '.join(known)}{more})")

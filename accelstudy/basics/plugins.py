@@ -21,7 +21,7 @@ from pathlib import Path
 from types import ModuleType
 from typing import Any
 
-from accelstudy.basics.errors import InputError
+from accelstudy.basics.errors import InputError, at, reason_of
 from accelstudy.basics.names import check_file_name
 
 PREFIX = "accelstudy."
@@ -66,10 +66,8 @@ def load_files(paths: Iterable[str | Path]) -> None:
 
 def load_plugins(content: Mapping[str, Any]) -> None:
     """Load the plug-ins that a configuration names; raises errors like `load_files`."""
-    try:
+    with at("plugins"):
         load_files(_plugin_names(content))
-    except InputError as error:
-        raise InputError(f"plugins: {error}") from None
 
 
 @contextmanager
@@ -96,10 +94,15 @@ def explain_missing(content: Mapping[str, Any], source: str | Path) -> Iterator[
 
 def _plugin_names(content: Mapping[str, Any]) -> list[str]:
     """Plug-ins that a file names; what is no text is none, and the schema refuses it."""
-    named = content.get("plugins") or ()
-    named = [named] if isinstance(named, str) else named
-    listed = isinstance(named, list | tuple | Mapping)  # 0.2 wrote a digest beside each name
-    return [name for name in named if isinstance(name, str)] if listed else []
+    named = as_names(content.get("plugins"))
+    return [name for name in named if isinstance(name, str)] if isinstance(named, list) else []
+
+
+def as_names(value: Any) -> Any:
+    """Names of plug-ins as a list: one, several, or each with a digest, as 0.2 wrote them."""
+    if isinstance(value, Mapping | tuple):
+        return list(value)
+    return [value] if isinstance(value, str) else value
 
 
 def _load_file(path: Path) -> None:
@@ -111,7 +114,7 @@ def _load_file(path: Path) -> None:
     except FileNotFoundError:
         raise InputError(f"{path}: no such file") from None
     except OSError as error:
-        raise InputError(f"{path}: cannot be read: {error.strerror}") from None
+        raise InputError(f"{path}: cannot be read: {reason_of(error)}") from None
     digest = hashlib.sha256(content).hexdigest()[:16]
     if digest in _files.values():
         return

@@ -5,7 +5,6 @@ from __future__ import annotations
 import io
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
-from difflib import get_close_matches
 from pathlib import Path
 from typing import Any
 
@@ -14,7 +13,7 @@ import pandas as pd
 import yaml
 from numpy.typing import NDArray
 
-from accelstudy.basics.errors import InputError, brief
+from accelstudy.basics.errors import InputError, at, brief, did_you_mean
 from accelstudy.basics.wording import one_line, short_list
 from accelstudy.campaign.columns import COLUMNS, KEYS, Columns, table_of
 from accelstudy.campaign.gross_errors.recognition import check_plausible
@@ -74,7 +73,7 @@ def read_campaign(folder: str | Path, *, plausible: bool = True, running: bool =
     else:
         campaign = _parse(columns, header, path, plausible)
         if unknown := [name for name in columns if name not in KEYS]:
-            hints = dict.fromkeys(_hint(name, KEYS) for name in unknown)
+            hints = dict.fromkeys(did_you_mean(name, KEYS) for name in unknown)
             said = f"{path}: not known and ignored: {short_list(unknown)}{''.join(hints)}"
             warnings = [said, *warnings]
     return replace(campaign, warnings=tuple(warnings))
@@ -86,13 +85,6 @@ def _text_of(path: Path) -> str:
         return read_text(path)
     except UnicodeDecodeError as error:
         raise InputError(f"{path}: not a CSV file in UTF-8 ({error.reason})") from None
-
-
-def _hint(name: str, known: Sequence[str]) -> str:
-    """Which of the known names may be meant."""
-    lower = {each.lower(): each for each in known}
-    near = get_close_matches(name[:100].lower(), lower, n=1)
-    return f"; did you mean {lower[near[0]]!r}?" if near else ""
 
 
 def _columns_of(text: str, path: Path) -> Table:
@@ -174,10 +166,8 @@ def _parse(columns: Table, header: Header, path: Path, plausible: bool = True) -
     campaign = Campaign(header.model_copy(update={"excluded": None}), table_of(arrays))
     if plausible:
         check_plausible(campaign, f"{path.with_name(HEADER)} and {path.name}")
-    try:
+    with at(path.with_name(HEADER)):
         return campaign.without(reasons)
-    except InputError as error:
-        raise InputError(f"{path.with_name(HEADER)}: {error}") from None
 
 
 def _numbers(columns: Table, name: str, column: Columns, rows: Sequence[str], path: Path) -> Array:
@@ -186,7 +176,9 @@ def _numbers(columns: Table, name: str, column: Columns, rows: Sequence[str], pa
         rest = ", ".join(other for other in column.keys if other != name)
         group = f" (it goes with {rest})" if rest else ""
         others = [other for other in columns if other not in KEYS]
-        raise InputError(f"{path}: {name}: the column is missing{group}{_hint(name, others)}")
+        raise InputError(
+            f"{path}: {name}: the column is missing{group}{did_you_mean(name, others)}"
+        )
     values = np.array([*map(_number, columns[name])])
 
     def refuse(wrong: NDArray[np.bool_], text: str) -> None:

@@ -17,7 +17,7 @@ from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
 from accelstudy.basics.dates import read_date
-from accelstudy.basics.errors import InputError, key
+from accelstudy.basics.errors import InputError, at, key
 from accelstudy.basics.units import GON, MGON, shown_unit, to_display
 from accelstudy.basics.wording import comma_list, estimate, plural
 from accelstudy.campaign.calibration.sensor_calibration import SensorCalibration
@@ -401,10 +401,8 @@ def dates_of(
                 f"{name}: date: missing; give `dates` for each calibration, or calibrate "
                 "again with `date` in the header of the campaign"
             )
-        try:
+        with at(key("dates") if dates else f"{name}: date"):
             stated.append(read_date(date))
-        except InputError as error:
-            raise InputError(f"{key('dates') if dates else f'{name}: date'}: {error}") from None
     return stated
 
 

@@ -13,7 +13,7 @@ from errno import ENOTDIR
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
-from accelstudy.basics.errors import InputError
+from accelstudy.basics.errors import InputError, reason_of
 
 _PREFIX = ".accelstudy-"
 
@@ -182,8 +182,7 @@ def cannot_write(error: OSError, out: Path) -> str:
     where = Path(str(error.filename)) if error.filename is not None else out
     inside = where.is_relative_to(out) or is_temporary(where)
     place = "" if inside else f"{where}: "
-    reason = str(error.strerror or error).rpartition("] ")[2]  # Arrow puts more before it
-    return f"{out}: cannot be written: {place}{reason}"
+    return f"{out}: cannot be written: {place}{reason_of(error)}"
 
 
 def is_temporary(path: Path) -> bool:

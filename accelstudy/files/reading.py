@@ -16,7 +16,7 @@ from typing import Any
 
 import yaml
 
-from accelstudy.basics.errors import InputError, brief, printable_line
+from accelstudy.basics.errors import InputError, brief, printable_line, reason_of
 from accelstudy.basics.names import check_file_name
 from accelstudy.basics.wording import one_line
 
@@ -46,8 +46,7 @@ def readable(path: str | Path) -> Iterator[None]:
     except OSError as error:
         if error.errno is None:  # not of the system, but of a library that finds the file odd
             raise
-        reason = str(error.strerror or error).rpartition("] ")[2]  # Arrow puts more before it
-        raise InputError(f"{path}: cannot be read: {reason}") from None
+        raise InputError(f"{path}: cannot be read: {reason_of(error)}") from None
 
 
 def read_text(path: str | Path, largest: int | None = None) -> str:

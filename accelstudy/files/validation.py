@@ -8,7 +8,6 @@ import math
 import re
 from collections.abc import Mapping
 from datetime import date
-from difflib import get_close_matches
 from pathlib import Path
 from typing import Annotated, Any, ClassVar, TypeVar
 
@@ -28,9 +27,9 @@ from pydantic_core import ErrorDetails, core_schema
 
 from accelstudy.basics import bounds
 from accelstudy.basics.bounds import Range
-from accelstudy.basics.errors import InputError, brief
+from accelstudy.basics.errors import InputError, brief, did_you_mean
 from accelstudy.basics.names import check_path_name
-from accelstudy.basics.plugins import load_plugins
+from accelstudy.basics.plugins import as_names, load_plugins
 from accelstudy.basics.units import InputQuantity
 from accelstudy.basics.wording import short_list
 
@@ -108,13 +107,6 @@ class _OneOrMore:
     @staticmethod
     def _as_list(value: Any) -> Any:
         return [value] if isinstance(value, str | int | float) else value
-
-
-def _plugin_names(value: Any) -> Any:
-    """Names of plug-ins: one, a list, or a mapping from names to digests, as 0.2 wrote them."""
-    if isinstance(value, Mapping):
-        return list(value)
-    return [value] if isinstance(value, str) else value
 
 
 T = TypeVar("T")
@@ -195,8 +187,7 @@ class ConfigSection(Described):
             if key in cls.retired:
                 raise KeyProblem(f"{key}: no longer a key; {cls.retired[key]}")
             if isinstance(key, str) and key not in (*known, *fields, *before):
-                near = get_close_matches(key[:100], known, n=1)
-                hint = f"; did you mean {near[0]!r}?" if near else ""
+                hint = did_you_mean(key, known)
                 raise KeyProblem(f"{key[:100]}: unknown key{hint} (known: {', '.join(known)})")
         return content
 
@@ -212,7 +203,7 @@ class Configuration(ConfigSection):
 
     plugins: Annotated[
         list[str],
-        BeforeValidator(_plugin_names, json_schema_input_type=str | list[str] | dict[str, str]),
+        BeforeValidator(as_names, json_schema_input_type=str | list[str] | dict[str, str]),
     ] = Field(default=[])
 
     @model_validator(mode="before")
@@ -227,7 +218,6 @@ def validate(
     model: type[Model],
     content: Mapping[str, Any],
     source: str | Path,
-    section: str = "",
     names: Mapping[str, str] | None = None,
 ) -> Model:
     """Check what was read from a file against a pydantic model.
@@ -237,7 +227,6 @@ def validate(
     model : subclass of BaseModel
     content : mapping, as read from YAML or JSON
     source : str or path, named in errors
-    section : str, key of `source` under which `content` stands
     names : mapping of str to str, optional
         Keys that are not of the source, as they were given on the command line, to what they are
         called there; then the error does not name the source.
@@ -254,24 +243,23 @@ def validate(
     try:
         return model.model_validate(content)
     except ValidationError as error:
-        text = _first_error(error, content, section)
+        text = _first_error(error, content)
         for key, name in (names or {}).items():
             if text.startswith((f"{key}: ", f"{key}.")):
                 raise InputError(f"{name}{text.removeprefix(key)}") from None
         raise InputError(f"{source}: {text}") from None
 
 
-def _first_error(error: ValidationError, content: object, section: str) -> str:
-    """Say in one line which key of a section is wrong, and what would be right."""
+def _first_error(error: ValidationError, content: object) -> str:
+    """Say in one line which key is wrong, and what would be right."""
     # Beside a missing key there is often its name with a typo, which says more.
     errors = sorted(error.errors(), key=lambda each: each["type"] == "missing")
-    places = [(section, *_place(each, content)) for each in errors]
-    keys = [".".join(str(part)[:100] for part in place if part != "") for place in places]
+    keys = [".".join(str(p)[:100] for p in _place(each, content) if p != "") for each in errors]
     first, key = errors[0], keys[0]
     if first["type"] == "value_error":
         problem = first["ctx"]["error"]
         # The check of a whole section names the key itself.
-        mark = "." if isinstance(problem, KeyProblem) or key == section else ": "
+        mark = "." if isinstance(problem, KeyProblem) else ": "
         text = mark.join(filter(None, [key, str(problem)]))
     else:
         # Where several kinds of values are right, there is an error for each of them.

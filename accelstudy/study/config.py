@@ -9,7 +9,6 @@ from __future__ import annotations
 import math
 import re
 from collections.abc import Callable, Collection, Iterable, Iterator, Mapping
-from contextlib import contextmanager
 from contextvars import ContextVar
 from functools import cached_property
 from itertools import product
@@ -30,7 +29,7 @@ from pydantic_core import core_schema
 
 from accelstudy.approaches import Approach, approach_names, get_approach
 from accelstudy.basics import bounds
-from accelstudy.basics.errors import InputError, brief
+from accelstudy.basics.errors import InputError, at, brief
 from accelstudy.basics.names import MAX_NAME_BYTES
 from accelstudy.basics.units import GON, MGON, STANDARD_GRAVITY, to_si
 from accelstudy.effects import Effect, get_effect
@@ -79,7 +78,7 @@ def parse_study(content: Mapping[str, Any], source: str = "config") -> Study:
         One line that names the source, the key, what is wrong and what would be right.
     """
     study = validate(Study, content, source)
-    with _at(source):
+    with at(source):
         study.check()
     return study
 
@@ -100,15 +99,6 @@ def config_schema() -> dict[str, Any]:
     """JSON schema of the configuration, as kept in `workflow/schemas/config.schema.json`."""
     dialect = "https://json-schema.org/draft/2020-12/schema"
     return {"$schema": dialect, **Study.model_json_schema()}
-
-
-@contextmanager
-def _at(key: str) -> Iterator[None]:
-    """Name the key at which an error occurs."""
-    try:
-        yield
-    except InputError as error:
-        raise InputError(f"{key}: {error}") from None
 
 
 # --- things that are written by their names -------------------------------------------------------
@@ -516,7 +506,7 @@ class Study(Configuration):
             One line that names the key, what is wrong and what would be right.
         """
         for name, quantity in self.sensor.items():
-            with _at(f"sensor.{name}"):
+            with at(f"sensor.{name}"):
                 quantity.in_si(get_effect(name))
         simulated = self.simulated_effects.effects if self.simulated_effects else ()
         models = [model for grid in self.grids for model in grid.models]
