@@ -30,12 +30,12 @@ from accelstudy.adjustment.gauss_helmert import Adjustment
 from accelstudy.adjustment.observations import Observations
 from accelstudy.approaches import Approach
 from accelstudy.basics.errors import InputError
-from accelstudy.basics.levels import REFUTATION_LEVEL
+from accelstudy.basics.levels import MAX_TILT_GON, REFUTATION_LEVEL
 from accelstudy.basics.units import GON
 from accelstudy.effects import HoldConditions
 from accelstudy.effects.hold_conditions import REFERENCE_TEMPERATURE
 from accelstudy.leveling.angles import angles_of, roll_pitch, tilt_slope, wrap_angle
-from accelstudy.leveling.error import MAX_TILT_GON, cap_forces
+from accelstudy.leveling.error import cap_forces
 from accelstudy.sensors.sensor import SensorModel
 
 Array = NDArray[np.float64]

@@ -10,10 +10,11 @@ from numpy.typing import ArrayLike, NDArray
 
 from accelstudy.approaches import Approach
 from accelstudy.basics.errors import InputError
+from accelstudy.basics.levels import MAX_TILT_GON
 from accelstudy.basics.units import GON
 from accelstudy.design.estimability import estimability
 from accelstudy.design.information import Information, position_rows, prior_rows
-from accelstudy.leveling.error import ATTITUDES, MAX_TILT_GON, cap_forces, tilt_error
+from accelstudy.leveling.error import ATTITUDES, cap_forces, tilt_error
 from accelstudy.positions.points import evenly_spread
 from accelstudy.positions.scheme import Scheme
 from accelstudy.sensors.sensor import SensorModel

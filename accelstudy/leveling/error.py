@@ -8,6 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from accelstudy.basics.levels import MAX_TILT_GON
 from accelstudy.basics.units import GON, STANDARD_GRAVITY
 from accelstudy.effects import HoldConditions
 from accelstudy.leveling.angles import angles_of, roll_pitch, tilt_slope, wrap_angle
@@ -17,8 +18,6 @@ Array = NDArray[np.float64]
 
 ATTITUDES = 200
 """Least number of attitudes over which a tilt error is averaged, unless another is given."""
-MAX_TILT_GON = 50.0
-"""Tilt up to which they lie, unless another is given."""
 RINGS = (0.0, 0.323911810519907637, 0.529656775285156812, 0.883861700758049036)
 """Chebyshev's nodes, and their negatives: the mean over all seven of a polynomial up to degree 7 is
 that over [−1, 1] (Abramowitz & Stegun, table 25.5)."""

@@ -11,10 +11,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from accelstudy.basics.errors import InputError
+from accelstudy.basics.levels import MAX_TILT_GON
 from accelstudy.basics.units import MGON
 from accelstudy.campaign.calibration.campaign_fit import CampaignFit
 from accelstudy.campaign.calibration.fit import fit_campaign
-from accelstudy.leveling.error import MAX_TILT_GON, attitudes_in_use, tilt_error
+from accelstudy.leveling.error import attitudes_in_use, tilt_error
 from accelstudy.lots.file_format import Tilt
 from accelstudy.lots.lot import LotDiagnosis
 from accelstudy.lots.passes import LotEffect

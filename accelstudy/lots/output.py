@@ -15,6 +15,7 @@ from matplotlib.figure import Figure
 from accelstudy.approaches import Approach
 from accelstudy.basics import suggestions
 from accelstudy.basics.errors import InputError
+from accelstudy.basics.levels import MAX_TILT_GON
 from accelstudy.basics.names import distinct, path_name
 from accelstudy.basics.progress import say, show
 from accelstudy.basics.units import GON
@@ -28,7 +29,6 @@ from accelstudy.diagnosis.decision.problem import fit_base
 from accelstudy.drawing.saving import save_all
 from accelstudy.drawing.style import FULL, new_figure, say_empty
 from accelstudy.files.outputs import LOT
-from accelstudy.leveling.error import MAX_TILT_GON
 from accelstudy.lots.calibration import LotCalibration
 from accelstudy.lots.evidence import either
 from accelstudy.lots.file_format import LotDocument

@@ -14,10 +14,11 @@ from numpy.typing import NDArray
 
 from accelstudy.adjustment.linear_theory import LinearTheory
 from accelstudy.approaches import Approach, get_approach
+from accelstudy.basics.levels import MAX_TILT_GON
 from accelstudy.basics.units import GON, MGON
 from accelstudy.design.estimability import Estimability, estimability
 from accelstudy.effects import HoldConditions
-from accelstudy.leveling.error import ATTITUDES, MAX_TILT_GON, TiltError, cap_forces, tilt_error
+from accelstudy.leveling.error import ATTITUDES, TiltError, cap_forces, tilt_error
 from accelstudy.schemes import Scheme, get_scheme
 from accelstudy.sensors.models import compose
 from accelstudy.sensors.sensor import SensorModel

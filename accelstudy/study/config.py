@@ -30,13 +30,14 @@ from pydantic_core import core_schema
 from accelstudy.approaches import Approach, approach_names, get_approach
 from accelstudy.basics import bounds
 from accelstudy.basics.errors import InputError, at, brief
+from accelstudy.basics.levels import MAX_TILT_GON
 from accelstudy.basics.names import MAX_NAME_BYTES
 from accelstudy.basics.units import GON, MGON, STANDARD_GRAVITY, to_si
 from accelstudy.effects import Effect, get_effect
 from accelstudy.files import validation as kinds
 from accelstudy.files.reading import overlay, read_layer
 from accelstudy.files.validation import ConfigSection, Configuration, OneOrMore, validate
-from accelstudy.leveling.error import ATTITUDES, MAX_TILT_GON
+from accelstudy.leveling.error import ATTITUDES
 from accelstudy.noise_effects import NoiseEffect, get_noise_effect
 from accelstudy.schemes import Scheme, get_scheme, scheme_names
 from accelstudy.schemes.files import known_scheme

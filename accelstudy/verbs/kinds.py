@@ -25,6 +25,7 @@ from accelstudy.basics import bounds
 from accelstudy.basics.arguments import as_sequence, check_type, path_of, quantity, whole_number
 from accelstudy.basics.bounds import Range
 from accelstudy.basics.errors import OPTIONS, InputError, brief, key
+from accelstudy.basics.levels import MAX_TILT_GON
 from accelstudy.basics.units import InputQuantity
 from accelstudy.verbs.retired import KEYWORDS as RETIRED
 
@@ -185,6 +186,7 @@ SHARE_OR_RMS = Kind(_share_or_rms, "share")
 File = Annotated[str | PathLike[str], PATH]
 Accuracy = Annotated[Quantity, angle(1e-9, math.pi / 2)]
 Tilt = Annotated[Quantity, angle(1e-3, math.pi / 2)]
+MAX_TILT = f"{MAX_TILT_GON:g}gon"
 Share = Annotated[Quantity, SHARE]
 Gravity = Annotated[Quantity, si("m/s^2", bounds.GRAVITY.least, bounds.GRAVITY.most)]
 

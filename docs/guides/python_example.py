@@ -12,7 +12,7 @@ diagnosis = acs.diagnose(campaign)
 print(diagnosis.state, diagnosis.explanations, diagnosis.calibration, sep="\n")
 diagnosis.plot()
 
-plan = acs.plan(tilt_accuracy="10 mgon", sigma="2 mm/s^2")
+plan = acs.plan(tilt_accuracy="10 mgon", tilt_range="30 gon", sigma="2 mm/s^2")
 print(plan.verdict)
 plan.plot()
 

@@ -165,7 +165,7 @@ def plans(folder) -> Texts:
 
 ADVISED = {
     "guide": ("--scheme faces-edges-corners-26 --approach gravity --seed 3",
-              "--tilt-accuracy 15mgon", None),
+              "--tilt-accuracy 15mgon --tilt-range 30gon", None),
     "robot": ("--scheme fibonacci-16 --order random --approach robot --seed 4 --no-sigma-known",
               "--tilt-accuracy 10mgon --tilt-range 30gon", 7),
 }  # fmt: skip

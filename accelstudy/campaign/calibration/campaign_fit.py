@@ -12,14 +12,14 @@ from numpy.typing import NDArray
 from accelstudy.adjustment import quality
 from accelstudy.adjustment.components import VarianceComponents, variance_components
 from accelstudy.approaches import Approach
-from accelstudy.basics.levels import ACCEPTED, IMPLAUSIBLE, REJECTED, UNCHECKED
+from accelstudy.basics.levels import ACCEPTED, IMPLAUSIBLE, MAX_TILT_GON, REJECTED, UNCHECKED
 from accelstudy.basics.shares import sigmas_95
 from accelstudy.basics.units import GON
 from accelstudy.campaign.gross_errors.recognition import Recognition, recognise
 from accelstudy.campaign.session import Campaign
 from accelstudy.design.estimability import Estimability
 from accelstudy.leveling.angles import tilt_by_output, tilt_slope
-from accelstudy.leveling.error import ATTITUDES, MAX_TILT_GON, cap_forces, holds_in_use
+from accelstudy.leveling.error import ATTITUDES, cap_forces, holds_in_use
 from accelstudy.sensors.plausibility import implausible_parameters, implausible_tilt
 from accelstudy.sensors.sensor import SensorModel
 

@@ -7,12 +7,12 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
+from accelstudy.basics.levels import MAX_TILT_GON
 from accelstudy.basics.units import MGON, recorded_unit, to_recorded
 from accelstudy.campaign.calibration.campaign_fit import CampaignFit
 from accelstudy.campaign.calibration.file_format import CalibrationDocument
 from accelstudy.campaign.calibration.sensor_calibration import FORCE_RANGES
 from accelstudy.campaign.calibration.wording import verdict_lines
-from accelstudy.leveling.error import MAX_TILT_GON
 from accelstudy.sensors.frames import FRD
 
 

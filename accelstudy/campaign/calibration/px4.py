@@ -17,11 +17,12 @@ from numpy.typing import NDArray
 
 from accelstudy import __version__
 from accelstudy.basics.errors import InputError
+from accelstudy.basics.levels import MAX_TILT_GON
 from accelstudy.basics.units import GON, MGON
 from accelstudy.campaign.calibration.sensor_calibration import DEVICE_COLUMNS, SensorCalibration
 from accelstudy.effects.hold_conditions import REFERENCE_TEMPERATURE
 from accelstudy.leveling.angles import angles_of, wrap_angle
-from accelstudy.leveling.error import MAX_TILT_GON, cap_forces
+from accelstudy.leveling.error import cap_forces
 from accelstudy.pages import render_lines
 from accelstudy.positions.points import evenly_spread
 

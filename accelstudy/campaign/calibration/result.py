@@ -14,7 +14,7 @@ from matplotlib.axes import Axes
 import accelstudy
 from accelstudy.basics.arguments import check_type, quantity
 from accelstudy.basics.errors import InputError
-from accelstudy.basics.levels import REFUTATION_LEVEL
+from accelstudy.basics.levels import MAX_TILT_GON, REFUTATION_LEVEL
 from accelstudy.basics.progress import say, show, warn
 from accelstudy.basics.suggestions import HERE
 from accelstudy.basics.units import GON, InputQuantity
@@ -31,7 +31,6 @@ from accelstudy.campaign.calibration.sensor_calibration import SensorCalibration
 from accelstudy.drawing.saving import save_all
 from accelstudy.files.outputs import CALIBRATION
 from accelstudy.files.tables import write_table
-from accelstudy.leveling.error import MAX_TILT_GON
 from accelstudy.pages import write_page
 from accelstudy.pages.result import Result
 from accelstudy.sensors.frames import axes_note

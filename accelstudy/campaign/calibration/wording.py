@@ -9,12 +9,11 @@ from typing import Any
 import numpy as np
 
 from accelstudy.basics import suggestions
-from accelstudy.basics.levels import ACCEPTED, BLIND, IMPLAUSIBLE, REJECTED
+from accelstudy.basics.levels import ACCEPTED, BLIND, IMPLAUSIBLE, MAX_TILT_GON, REJECTED
 from accelstudy.basics.units import GON, display_unit
 from accelstudy.basics.wording import estimate
 from accelstudy.campaign.calibration.campaign_fit import CampaignFit
 from accelstudy.campaign.importing.noise import steps_text
-from accelstudy.leveling.error import MAX_TILT_GON
 from accelstudy.pages import render_lines
 from accelstudy.sensors.plausibility import USUAL_CAUSE
 

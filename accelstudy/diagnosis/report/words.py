@@ -9,7 +9,7 @@ import sys
 from collections.abc import Mapping, Sequence
 from typing import NamedTuple
 
-from accelstudy.basics.levels import ACCEPTED, UNCHECKED
+from accelstudy.basics.levels import ACCEPTED, MAX_TILT_GON, UNCHECKED
 from accelstudy.basics.units import GON, attitude_unit, shown_unit, to_attitude
 from accelstudy.basics.wording import (
     amount,
@@ -33,7 +33,6 @@ from accelstudy.diagnosis.result import CampaignDiagnosis
 from accelstudy.diagnosis.rules import RULES
 from accelstudy.effects import Effect, get_effect
 from accelstudy.effects.learned import LEARNED, WAVES, LearnedFunction
-from accelstudy.leveling.error import MAX_TILT_GON
 from accelstudy.pages import render_lines
 from accelstudy.sensors.plausibility import USUAL_CAUSE  # noqa: F401 (of the template)
 
