@@ -107,13 +107,13 @@ def check_sigmas(
         accelstudy check-sigmas my-campaign --replicates 500
     """
     from accelstudy.campaign.calibration.sigma_check import check_sigmas as check
-    from accelstudy.campaign.calibration.wording import what_a_check_finds
+    from accelstudy.campaign.calibration.wording import sentences
     from accelstudy.verbs.inputs import fit_of
 
     fit = fit_of(campaign, model, approach)
     table = check(fit, replicates, seed)
     meaning = "sigma: as the adjustment claims it; ratio: sigma / sd_empirical."
-    table.attrs["legend"] = f"{meaning}\n{what_a_check_finds(fit)}"
+    table.attrs["legend"] = f"{meaning}\n{sentences(fit, 'finds')[0]}"
     return table
 
 

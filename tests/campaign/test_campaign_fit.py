@@ -9,7 +9,7 @@ from usual import GRAVITY, NINE, ROBOT
 
 from accelstudy.basics.errors import InputError
 from accelstudy.campaign.calibration.fit import fit_campaign, initial_values
-from accelstudy.campaign.calibration.wording import verdict_lines
+from accelstudy.campaign.calibration.wording import sentences
 from accelstudy.schemes import get_scheme
 
 
@@ -45,7 +45,7 @@ def test_positions_in_conflict_are_not_blamed_alone(bumped, said):
     factors = np.ones((measured.n_positions, 1))
     factors[bumped, 0] = [1.01, 0.994, 1.003][: len(bumped)]
     measured = measured.with_arrays(forces=factors * measured.forces)
-    lines = verdict_lines(fit_campaign(measured, NINE, GRAVITY))
+    lines = sentences(fit_campaign(measured, NINE, GRAVITY))
     found = [line for line in lines if line.startswith("In conflict")]
     assert len(found) == bool(bumped)
     assert ("“accelstudy diagnose” looks for what is wrong or missing." in lines) == bool(bumped)

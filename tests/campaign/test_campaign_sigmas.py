@@ -13,7 +13,7 @@ from accelstudy.adjustment import Observations, calibrate
 from accelstudy.basics.errors import InputError
 from accelstudy.campaign.calibration.fit import fit_campaign
 from accelstudy.campaign.calibration.sigma_check import check_sigmas
-from accelstudy.campaign.calibration.wording import interval_words, what_a_check_finds
+from accelstudy.campaign.calibration.wording import sentences
 from accelstudy.simulation.sessions import Noise
 
 G, SIGMA, SESSIONS = 9.81, 0.002, 4000
@@ -50,7 +50,7 @@ def test_the_intervals_of_a_calibration_hold_95_percent():
     assert one.content["redundancy"] == 15
     assert needed == pytest.approx(2.131, abs=5e-4)  # of any table of Student's t
     assert [p["ci95"] for p in one.content["parameters"]] == pytest.approx(needed * fit.sigma)
-    assert "2.13 of them hold 95 % (Student's t, r = 15)" in interval_words(fit)
+    assert "2.13 of them hold 95 % (Student's t, r = 15)" in sentences(fit, "sigmas")[0]
 
     adjusted = calibrate(NINE, GRAVITY, Observations(forces, sigma_force=SIGMA, gravity=G))
     truth = np.concatenate([BIAS, SCALE, np.zeros(3)])
@@ -78,13 +78,12 @@ def test_a_wrong_noise_does_not_show_in_simulation_and_is_said():
     assert (fooled.sigma < 0.8 * honest.sigma).all()
     table = check_sigmas(fooled, replicates=1000, seed=3)
     assert np.abs(table["ratio"] - 1).max() < 4.5 / math.sqrt(2 * 1000)
-    assert "no ratio can show" in what_a_check_finds(fooled)
-    assert "the global test tells" in what_a_check_finds(honest)
+    assert "no ratio can show" in sentences(fooled, "finds")[0]
+    assert "the global test tells" in sentences(honest, "finds")[0]
     refuted = once.with_sigma(1e-4)
-    assert "has the noise in the residuals" in what_a_check_finds(
-        fit_campaign(refuted, NINE, GRAVITY)
-    )
+    found = sentences(fit_campaign(refuted, NINE, GRAVITY), "finds")[0]
+    assert "has the noise in the residuals" in found
     few = simulated_campaign({"b_x": 0.1}, scheme="d-optimal-9", noise=Noise(0.002))
-    assert "nothing tells" in what_a_check_finds(fit_campaign(few, NINE, GRAVITY))
+    assert "nothing tells" in sentences(fit_campaign(few, NINE, GRAVITY), "finds")[0]
     with pytest.raises(InputError, match="no sigma to check"):
         check_sigmas(fit_campaign(few.with_sigma(None), NINE, GRAVITY))

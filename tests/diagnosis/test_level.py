@@ -9,7 +9,7 @@ from usual import GRAVITY, NINE, ROBOT
 
 from accelstudy.basics.levels import REFUTATION_LEVEL
 from accelstudy.campaign.calibration.fit import fit_campaign
-from accelstudy.campaign.calibration.wording import verdict_lines as calibrated_lines
+from accelstudy.campaign.calibration.wording import sentences as calibrated_lines
 from accelstudy.diagnosis.decision.problem import SEED, BaseFit, Problem
 from accelstudy.diagnosis.decision.verdict import decide
 from accelstudy.diagnosis.evidence import detection

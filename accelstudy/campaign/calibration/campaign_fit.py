@@ -56,6 +56,12 @@ class TiltBudget:
         """Tilt error by the parameters and by what the model lacks together."""
         return np.hypot(self.parameters, self.missing)
 
+    @property
+    def limit(self) -> str:
+        """Effect with the largest share; empty where there are no sigmas."""
+        largest = {name: float(share.max()) for name, share in self.shares.items()}
+        return max(largest, key=largest.__getitem__) if np.isfinite(self.total).all() else ""
+
 
 @dataclass(frozen=True)
 class NoiseJudgement:

@@ -12,7 +12,7 @@ from accelstudy.basics.units import MGON, recorded_unit, to_recorded
 from accelstudy.campaign.calibration.campaign_fit import CampaignFit
 from accelstudy.campaign.calibration.file_format import CalibrationDocument
 from accelstudy.campaign.calibration.sensor_calibration import FORCE_RANGES
-from accelstudy.campaign.calibration.wording import verdict_lines
+from accelstudy.campaign.calibration.wording import sentences
 from accelstudy.sensors.frames import FRD
 
 
@@ -104,7 +104,7 @@ def _quality(fit: CampaignFit) -> dict[str, Any]:
         "plausible": not fit.warnings,
         "warnings": fit.warnings,
         "gross_error": fit.gross_error,
-        "verdict": " ".join(verdict_lines(fit)),
+        "verdict": " ".join(sentences(fit)),
         "global_test": fit.global_test,
         "suspects": [{"position": n, "p_value": p} for n, p in fit.suspects.items()],
         "held_out": None

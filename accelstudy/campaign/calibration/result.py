@@ -197,7 +197,7 @@ class Calibration(Result):
 
     def _write_page(self, fit: CampaignFit, folder: Path, place: Path) -> None:
         """Write positions.parquet, figures/ and report.html."""
-        positions, lines = self.residuals, wording.verdict_lines(fit)
+        positions, lines = self.residuals, wording.sentences(fit)
         drawn = save_all(
             {
                 "residuals": lambda: residual_figure(fit, positions),
@@ -230,8 +230,8 @@ class Calibration(Result):
             warn(warning)
         say("\n".join(wording.parameter_lines(self.content)))
         if self.content["sigmas_95"] is not None:
-            say(f"±: {wording.interval_words(fit)}")
-        say(wording.approach_words(fit))
+            say(f"±: {wording.sentences(fit, 'sigmas')[0]}")
+        say(wording.sentences(fit, "approach")[0])
         say(axes_note(None if (log := fit.campaign.header.log) is None else log.frame))
         show(f"{self.state.upper()}: {self.verdict}")
         steps = wording.next_steps(fit, self.source, place / HERE)

@@ -25,7 +25,7 @@ def check_sigmas(fit: CampaignFit, replicates: int = 2000, seed: int = 1) -> pd.
 
     The simulation has the noise that the sigmas are quoted from: the stated one if it is trusted,
     else that of the residuals. So it finds sigmas that are wrong because the model is not linear
-    within its errors, and none that are wrong because this noise is; see `what_a_check_finds`.
+    within its errors, and none that are wrong because this noise is; see `wording.sentences`.
 
     Parameters
     ----------

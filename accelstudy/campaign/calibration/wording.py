@@ -1,23 +1,27 @@
-"""A calibration in words: how good it is, what limits it, and what to do next."""
+"""A calibration in words: how good it is, what limits it, and what to do next.
+
+The sentences stand in `wording.txt.j2`, which takes names of this module from `w`.
+"""
 
 from __future__ import annotations
 
+import sys
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-
 from accelstudy.basics import suggestions
-from accelstudy.basics.levels import ACCEPTED, BLIND, IMPLAUSIBLE, MAX_TILT_GON, REJECTED
+from accelstudy.basics.levels import BLIND, IMPLAUSIBLE, MAX_TILT_GON, REJECTED  # noqa: F401
 from accelstudy.basics.units import GON, display_unit
 from accelstudy.basics.wording import estimate
 from accelstudy.campaign.calibration.campaign_fit import CampaignFit
-from accelstudy.campaign.importing.noise import steps_text
+from accelstudy.campaign.importing.noise import steps_text  # noqa: F401
 from accelstudy.pages import render_lines
-from accelstudy.sensors.plausibility import USUAL_CAUSE
+from accelstudy.sensors.plausibility import USUAL_CAUSE  # noqa: F401
 
+HERE = sys.modules[__name__]
 TEMPLATE = "campaign/calibration/wording.txt.j2"
+MAX_TILT = MAX_TILT_GON * GON
 ANGLES = {"nonorthogonality", "cross_axis_misalignment"}
 """Effects of which a model needs one, or it takes the axes to be at right angles."""
 
@@ -31,43 +35,17 @@ def parameter_lines(content: Mapping[str, Any]) -> list[str]:
     return shown
 
 
-def verdict_lines(fit: CampaignFit) -> list[str]:
-    """Say how good the calibration is, for what, and what limits it; the verdict comes first."""
-    state, shares = fit.state, fit.tilt.shares
-    steps = fit.campaign.header.resolution_mps2
-    says_tilt = state != IMPLAUSIBLE and np.isfinite(fit.tilt.total).all()
-    suspects = dict(sorted(fit.suspects.items()))
-    return render_lines(
-        TEMPLATE,
-        "verdict",
-        fit=fit,
-        suspects=suspects,
-        limit=max(shares, key=lambda name: float(shares[name].max())) if says_tilt else "",
-        max_tilt=MAX_TILT_GON * GON,
-        usual_cause=USUAL_CAUSE,
-        diagnose=state in (REJECTED, IMPLAUSIBLE) or (state != ACCEPTED and bool(suspects)),
-        resolution="" if steps is None else steps_text(np.array(steps)),
-        right_angles=state != REJECTED
-        and not ANGLES & {effect.name for effect in fit.model.effects},
-        blind="" if fit.approach.uses_angles else BLIND,
-    )
+def sentences(fit: CampaignFit, part: str = "verdict") -> list[str]:
+    """Say something of a calibration, a sentence each.
 
-
-def approach_words(fit: CampaignFit) -> str:
-    """Say what the positions were held against."""
-    campaign = fit.campaign
-    has = campaign.angles is not None, campaign.header.reference is not None
-    return render_lines(TEMPLATE, "approach", fit.approach.name, fit.approach.uses_angles, *has)[0]
-
-
-def interval_words(fit: CampaignFit) -> str:
-    """Say what the sigmas are, and how many of them hold 95 %."""
-    return render_lines(TEMPLATE, "sigmas", fit)[0]
-
-
-def what_a_check_finds(fit: CampaignFit) -> str:
-    """Say what `check_sigmas` can find, and what it cannot."""
-    return render_lines(TEMPLATE, "finds", fit)[0]
+    Parameters
+    ----------
+    fit : CampaignFit
+    part : macro of the template: the "verdict", how good it is, for what, and what limits it; the
+        "approach", what its positions were held against; "sigmas", what these are; or "finds", what
+        `check_sigmas` can find, and what it cannot
+    """
+    return render_lines(TEMPLATE, part, fit, HERE)
 
 
 def next_steps(fit: CampaignFit, campaign: Path, result: Path) -> list[tuple[str, str]]:
