@@ -15,7 +15,7 @@ from accelstudy.adjustment import calibrate
 from accelstudy.basics.errors import InputError
 from accelstudy.basics.units import GON, MGON
 from accelstudy.campaign.calibration.leveling import level
-from accelstudy.campaign.calibration.sensor_calibration import calibration_of
+from accelstudy.campaign.calibration.result import Calibration
 from accelstudy.campaign.header import LogLayout
 from accelstudy.effects import HoldConditions
 from accelstudy.leveling.angles import specific_force
@@ -255,7 +255,8 @@ def test_what_the_calibration_did_not_see_is_counted():
 
 def test_a_calibration_that_no_sensor_has_is_not_applied_without_a_word(plain):
     quality = {"plausible": False, "warnings": ["s_y is beyond"], "state": "implausible"}
-    doubtful = calibration_of({**plain.document.model_dump(), "log": None, "quality": quality})
+    content = {**plain.document.model_dump(), "log": None, "quality": quality}
+    doubtful = Calibration(None, content).sensor
     _, warnings = leveled_rows(doubtful, mixed_log()[AXES])
     assert "do not use this calibration: s_y is beyond" in warnings
 

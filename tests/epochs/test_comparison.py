@@ -9,7 +9,7 @@ from session_helpers import SENSOR, document
 from accelstudy.basics.units import GON, MGON
 from accelstudy.basics.units import STANDARD_GRAVITY as G
 from accelstudy.campaign.calibration.leveling import level
-from accelstudy.campaign.calibration.sensor_calibration import calibration_of
+from accelstudy.campaign.calibration.result import Calibration
 from accelstudy.epochs.history import History
 from accelstudy.files.documents import json_text
 from accelstudy.leveling.angles import angles_of, wrap_angle
@@ -17,7 +17,7 @@ from accelstudy.leveling.error import cap_forces
 
 
 def calibrated(seed, **options):
-    return calibration_of(json.loads(json_text(document(seed, **options))))
+    return Calibration(None, json.loads(json_text(document(seed, **options)))).sensor
 
 
 def compare(first, second):

@@ -8,7 +8,7 @@ import pytest
 from session_helpers import document
 
 from accelstudy.basics.units import GON, MGON
-from accelstudy.campaign.calibration.sensor_calibration import calibration_of
+from accelstudy.campaign.calibration.result import Calibration
 from accelstudy.epochs.course import YEAR
 from accelstudy.epochs.history import History
 from accelstudy.epochs.interval import MAX_YEARS, Interval
@@ -23,7 +23,7 @@ AT = np.array([-2.5, -2.0, -1.4, -0.9, -0.5, 0.0])
 @pytest.fixture(scope="module")
 def session():
     effects = ("bias: 0.1, 0.05, -0.1", "scale: 0.002, -0.001, 0.003")
-    return calibration_of(document(1, model="bias-scale", effects=effects))
+    return Calibration(None, document(1, model="bias-scale", effects=effects)).sensor
 
 
 def roll_and_pitch(f):

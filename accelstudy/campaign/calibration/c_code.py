@@ -45,8 +45,8 @@ def c_header(calibration: SensorCalibration, real: str = "float") -> str:
         If an effect depends on what no device knows.
     """
     calibration.check_device()
-    model, p, raw = calibration.model, calibration.parameters, calibration.conversion
-    frame, write = calibration.usual_layout.axes, _Writer(real)
+    model, p, layout = calibration.model, calibration.parameters, calibration.usual_layout
+    frame, raw, write = layout.axes, layout.conversion, _Writer(real)
     offset, zero = np.broadcast_to(raw.offset, 3), np.zeros(3)
     linear = calibration.mending @ frame.matrix * raw.scale
     lines, output, columns = list[str](), list[str](), set[str]()
@@ -67,7 +67,7 @@ def c_header(calibration: SensorCalibration, real: str = "float") -> str:
         version=__version__,
         calibration=calibration,
         sigmas=np.sqrt(np.diag(calibration.covariance)),
-        layout=calibration.usual_layout,
+        layout=layout,
         end=calibration.ranges.get("time_s", (0.0, None))[1],
         steps=MAX_STEPS,
         last_step=LAST_STEP,

@@ -11,7 +11,7 @@ from accelstudy.basics.levels import MAX_TILT_GON
 from accelstudy.basics.units import MGON, recorded_unit, to_recorded
 from accelstudy.campaign.calibration.campaign_fit import CampaignFit
 from accelstudy.campaign.calibration.file_format import CalibrationDocument
-from accelstudy.campaign.calibration.sensor_calibration import FORCE_RANGES
+from accelstudy.campaign.calibration.sensor_calibration import ranged_values
 from accelstudy.campaign.calibration.wording import sentences
 from accelstudy.sensors.frames import FRD
 
@@ -25,12 +25,6 @@ def calibration_document(fit: CampaignFit) -> dict[str, Any]:
     covariance, sigma = fit.covariance, fit.sigma
     sigma_priori = np.sqrt(np.diag(solution.cofactors))
     affine = fit.model.affine(fit.parameters)
-    ranged = {
-        "time_s": campaign.time,
-        "temperature_degC": campaign.temperature,
-        "vibration_mps2": campaign.vibration,
-        **dict(zip(FORCE_RANGES, fit.corrected.T, strict=True)),
-    }
     content = {
         "campaign": campaign.name,
         "sensor": header.sensor,
@@ -83,9 +77,9 @@ def calibration_document(fit: CampaignFit) -> dict[str, Any]:
         "range_mps2": header.range_mps2,
         # Forces that the calibration cannot correct, as of exchanged axes, have no range.
         "ranges": {
-            k: [v.min(), v.max()]
-            for k, v in ranged.items()
-            if v is not None and np.isfinite(v).all()
+            key: [values.min(), values.max()]
+            for key, values in ranged_values(fit.corrected, campaign.hold).items()
+            if np.isfinite(values).all()
         },
         "log": header.log and header.log.model_dump(exclude_none=True, by_alias=True),
         "warnings": campaign.warnings,

@@ -32,7 +32,7 @@ def matrix_text(calibration: SensorCalibration) -> str:
     affine = model.affine(calibration.parameters)
     if affine is None:
         raise InputError(f"the model {model.name!r} with these parameters has no inverse")
-    (k, bias), raw = affine, calibration.conversion
+    (k, bias), raw = affine, calibration.usual_layout.conversion
     linear = frame.matrix.T @ k @ calibration.mending @ frame.matrix * raw.scale
     rows = np.column_stack([linear, -linear @ raw.offset - frame.matrix.T @ k @ bias])
     return "".join(" ".join(f"{value: .12e}" for value in row) + "\n" for row in rows)

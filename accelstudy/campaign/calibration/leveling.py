@@ -21,9 +21,11 @@ from accelstudy.basics.progress import show, track, warn
 from accelstudy.basics.units import attitude_unit, display_unit, to_attitude, to_display
 from accelstudy.basics.wording import one_line
 from accelstudy.campaign.calibration.sensor_calibration import (
-    FORCE_RANGES,
+    DEVICE_COLUMNS,
     RANGE_MARGIN,
+    RANGED,
     SensorCalibration,
+    ranged_values,
 )
 from accelstudy.campaign.gross_errors.recognition import check_size
 from accelstudy.campaign.importing.columns import AXES
@@ -36,6 +38,7 @@ from accelstudy.pages import render_lines
 
 Array = NDArray[np.float64]
 
+TEMPLATE = "campaign/calibration/leveling.txt.j2"
 SATURATED_SHARE = 0.999
 """A reading beyond this part of the sensor's range is saturated: the last count is often below the
 range."""
@@ -152,7 +155,7 @@ class Leveling:
         self.log.check_units([condition for _, condition in self.calibration.model.needs])
         usable = self.forces[np.isfinite(self.forces).all(axis=1)]
         if not len(usable):
-            first = f"; the first: {self._reason(0)}" if len(self.forces) else ""
+            first = f"; the first: {self.reason(0)}" if len(self.forces) else ""
             raise InputError(f"{path}: no row has three numbers{first}")
         check_size(f"{path}", usable, self.calibration.gravity, layout.unit, layout.conversion)
 
@@ -201,30 +204,15 @@ class Leveling:
     @cached_property
     def warnings(self) -> tuple[str, ...]:
         """What the user should know of the calibration and of the rows."""
-        needs, lost = self.calibration.model.needs, self.lost
-        timed = [effect for effect, column in needs if self.start is None and column == "time"]
-        lagging = [effect for effect in timed if (effect, "temperature") in needs]
-        lines = render_lines(
-            "campaign/calibration/leveling.txt.j2",
-            "warnings",
-            sensor=self.calibration,
-            log=self.log,
-            mends=self.mends,
-            timed=[effect for effect in timed if effect not in lagging],
-            lagging=lagging,
-            moved={effect for effect, column in needs if column.startswith("step_")},
-            rows=len(lost),
-            empty=int(lost.sum()),
-            reason=self._reason(int(np.argmax(lost))) if lost.any() else "",
-            near=self.added[NEAR_POLE].sum(),
-            vertical=np.pi / 2,
-            many=MANY_SIGMAS,
-            after=self._rows_after_drifts(),
-            beyond=[*self._beyond_ranges()],
-        )
-        return tuple(lines)
+        return tuple(render_lines(TEMPLATE, "warnings", self, MANY_SIGMAS, np.pi / 2))
 
-    def _reason(self, row: int) -> str:
+    @property
+    def uncorrected(self) -> set[str]:
+        """Effects that depend on the position before, which a log does not have."""
+        needs = self.calibration.model.needs
+        return {effect for effect, column in needs if column.startswith("step_")}
+
+    def reason(self, row: int) -> str:
         """Say why a row is empty, and where it is."""
         needed = {*AXES, "time", *(column for _, column in self.calibration.model.needs)}
         lost = [key for key in self.log.unreadable(row) if key in needed]
@@ -235,28 +223,25 @@ class Leveling:
         end = "" if full is None else f", or it is at the end of the range, ± {full:.4g} m/s²"
         return f"{where}: the calibration has no force for such a reading{end}"
 
-    def _rows_after_drifts(self) -> int:
+    @property
+    def rows_after_drifts(self) -> int:
         """Number of rows after the session in which effects were seen to drift."""
         session, time = self.calibration.ranges.get("time_s"), self.hold.time
         if not self.calibration.drifts or session is None or time is None:
             return 0
         return int(np.sum(time > (1 + RANGE_MARGIN) * session[1]))
 
-    def _beyond_ranges(self) -> Iterator[dict[str, Any]]:
+    @property
+    def beyond_ranges(self) -> Iterator[dict[str, Any]]:
         """What lies beyond the ranges of the calibration, in how many rows, and how far."""
         forces = self.log.layout.axes.to_frd(self.added.iloc[:, :3].to_numpy())
-        columns = {
-            "temperature_degC": ("temperature", "°C", self.hold.temperature),
-            "vibration_mps2": ("vibration", "m/s²", self.hold.vibration),
-        }
-        for (name, way), force in zip(FORCE_RANGES.items(), forces.T, strict=True):
-            columns[name] = "specific force", f"m/s² {way}", force
-        for name, (what, unit, values) in columns.items():
-            if values is None or name not in self.calibration.ranges:
+        for name, values in ranged_values(forces, self.hold).items():
+            if name == DEVICE_COLUMNS["time"] or name not in self.calibration.ranges:
                 continue
             low, high = self.calibration.ranges[name]
             excess = np.fmax(low - values, values - high)  # NaN where there is no number
             if count := int(np.sum(excess > RANGE_MARGIN * max(high - low, 1e-9))):
+                what, unit = RANGED[name]
                 value = values[np.nanargmax(excess)]
                 yield {"what": what, "count": count, "value": value, "unit": unit,
                        "low": low, "high": high}  # fmt: skip

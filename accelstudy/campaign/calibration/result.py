@@ -27,7 +27,7 @@ from accelstudy.campaign.calibration.figures import (
     residual_figure,
 )
 from accelstudy.campaign.calibration.file_format import CalibrationDocument
-from accelstudy.campaign.calibration.sensor_calibration import SensorCalibration, calibration_of
+from accelstudy.campaign.calibration.sensor_calibration import SensorCalibration
 from accelstudy.drawing.saving import save_all
 from accelstudy.files.outputs import CALIBRATION
 from accelstudy.files.tables import write_table
@@ -103,7 +103,8 @@ class Calibration(Result):
     @cached_property
     def sensor(self) -> SensorCalibration:
         """The calibration as it stays with the sensor: it levels readings, and is compared."""
-        return calibration_of(self.content)
+        document = CalibrationDocument.check(self.content)
+        return SensorCalibration.of(document, CalibrationDocument.refusal())
 
     def _matrix(self, key: str) -> pd.DataFrame:
         names = self.parameters.index

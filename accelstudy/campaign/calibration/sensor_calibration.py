@@ -20,7 +20,6 @@ from accelstudy.campaign.header import LogLayout
 from accelstudy.effects import HoldConditions, TemperatureCourse
 from accelstudy.effects.hold_conditions import REFERENCE_TEMPERATURE
 from accelstudy.leveling.angles import angles_of, tilt_by_output, tilt_slope
-from accelstudy.sensors.conversion import Conversion, conversion_of
 from accelstudy.sensors.models import compose
 from accelstudy.sensors.sensor import SensorModel
 
@@ -29,10 +28,14 @@ Array = NDArray[np.float64]
 
 RANGE_MARGIN = 0.1
 """Part of the width of a range by which a log may leave it without a warning."""
-FORCE_RANGES = {"fx_mps2": "forward", "fy_mps2": "right", "fz_mps2": "down"}
-"""Ranges of the calibrated forces, and where they point."""
-DEVICE_COLUMNS = {name: COLUMNS[name].keys[0] for name in ("temperature", "time", "vibration")}
+DEVICE_COLUMNS = {name: COLUMNS[name].keys[0] for name in ("time", "temperature", "vibration")}
 """Columns of `HoldConditions` that a device has, and the ranges of a calibration in them."""
+FORCES = ("fx_mps2", "fy_mps2", "fz_mps2")
+RANGED = {key: (name, COLUMNS[name].unit) for name, key in DEVICE_COLUMNS.items()} | {
+    key: ("specific force", f"m/s² {way}")
+    for key, way in zip(FORCES, ("forward", "right", "down"), strict=True)
+}
+"""What a calibration has a range of, in words, and its unit."""
 LEVELS = 5
 """Number of values of a condition that matters."""
 
@@ -92,12 +95,6 @@ class SensorCalibration:
         nominal = self.document.nominal
         of_unit = {} if nominal is None else nominal.model_dump()
         return self.document.log or LogLayout(unit=self.document.unit, **of_unit)
-
-    @cached_property
-    def conversion(self) -> Conversion:
-        """Conversion from raw readings to m/s²."""
-        layout = self.usual_layout
-        return conversion_of(layout.unit, layout.scale, layout.offset)
 
     @cached_property
     def mending(self) -> Array:
@@ -257,10 +254,11 @@ def sensor_of(given: Any, name: str = "calibration") -> SensorCalibration:
     raise InputError(f"{name}: expected {expected}, not {brief(given)}")
 
 
-def calibration_of(content: Any) -> SensorCalibration:
-    """Take the content of `calibration.json`; raise `InputError` if it is something else."""
-    document = CalibrationDocument.check(content)
-    return SensorCalibration.of(document, CalibrationDocument.refusal())
+def ranged_values(forces: Array, hold: HoldConditions) -> dict[str, Array]:
+    """Values of what a calibration has ranges of: forces (n, 3), m/s² in frd, and conditions."""
+    values = {key: getattr(hold, name) for name, key in DEVICE_COLUMNS.items()}
+    values |= zip(FORCES, forces.T, strict=True)
+    return {key: each for key, each in values.items() if each is not None}
 
 
 def unknown_to_devices(model: SensorModel) -> list[tuple[str, str]]:
