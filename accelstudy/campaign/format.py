@@ -10,7 +10,6 @@ from typing import Any
 
 import numpy as np
 import pandas as pd
-import yaml
 from numpy.typing import NDArray
 
 from accelstudy.basics.errors import InputError, at, brief, did_you_mean
@@ -19,7 +18,7 @@ from accelstudy.campaign.columns import COLUMNS, KEYS, Columns, table_of
 from accelstudy.campaign.gross_errors.recognition import check_plausible
 from accelstudy.campaign.header import HEADER, TABLE, Header
 from accelstudy.campaign.session import Campaign
-from accelstudy.files.outputs import whole_file
+from accelstudy.files.outputs import write_text, write_yaml
 from accelstudy.files.reading import read_layer, read_text
 from accelstudy.files.validation import validate
 
@@ -123,8 +122,7 @@ def write_campaign(campaign: Campaign, folder: str | Path, plausible: bool = Tru
     Raises
     ------
     InputError
-        If the campaign could not be read again (nothing is written then), or the folder cannot be
-        written.
+        If the campaign could not be read again; nothing is written then.
     """
     folder = Path(folder)
     header, path = campaign.header, folder / TABLE
@@ -132,15 +130,8 @@ def write_campaign(campaign: Campaign, folder: str | Path, plausible: bool = Tru
         header = campaign.with_header(excluded=campaign.exclusions).header
     columns = _columns_in_file(campaign)
     _parse(columns, header, path, plausible)
-    try:
-        with whole_file(path) as part, part.open("w", newline="", encoding="utf-8") as file:
-            pd.DataFrame(columns).to_csv(file, index=False, lineterminator="\n")
-        with whole_file(folder / HEADER) as temporary:
-            content = header.model_dump(mode="json", exclude_none=True, by_alias=True)
-            text = yaml.safe_dump(content, sort_keys=False, allow_unicode=True)
-            temporary.write_text(text, encoding="utf-8")
-    except OSError as error:
-        raise InputError(f"{folder}: cannot be written: {error.strerror or error}") from None
+    write_text(path, pd.DataFrame(columns).to_csv(index=False, lineterminator="\n"))
+    write_yaml(folder / HEADER, header.model_dump(mode="json", exclude_none=True, by_alias=True))
 
 
 def _parse(columns: Table, header: Header, path: Path, plausible: bool = True) -> Campaign:

@@ -5,12 +5,10 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from dataclasses import fields, replace
-from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
-import yaml
 from numpy.typing import NDArray
 
 from accelstudy.approaches import get_approach
@@ -20,7 +18,6 @@ from accelstudy.basics.registry import WithSettings
 from accelstudy.basics.units import MGON
 from accelstudy.campaign.session import Campaign
 from accelstudy.effects import Effect, get_effect
-from accelstudy.files.outputs import whole_file
 from accelstudy.noise_effects import get_noise_effect
 from accelstudy.schemes import get_scheme
 from accelstudy.sensors.models import compose, get_model
@@ -117,13 +114,6 @@ def simulate_campaign(given: Mapping[str, Any]) -> Campaign:
             },
         },
     )
-
-
-def write_truth(campaign: Campaign, path: str | Path) -> None:
-    """Write the truth as YAML."""
-    text = yaml.safe_dump(dict(campaign.truth), sort_keys=False, allow_unicode=True)
-    with whole_file(path) as temporary:
-        temporary.write_text(text, encoding="utf-8")
 
 
 def _hidden_effect(text: str, size: float, rng: np.random.Generator) -> tuple[Effect, Array]:

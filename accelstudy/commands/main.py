@@ -25,7 +25,6 @@ def simulate_campaign(
 ) -> None:
     """Write a simulated campaign and, apart from it, the truth."""
     from accelstudy.campaign.format import write_campaign
-    from accelstudy.campaign.simulated import write_truth
 
     # The truth enters first and is moved last: it may be meant for a folder that is made here.
     with (
@@ -35,7 +34,7 @@ def simulate_campaign(
         campaign = campaigns.simulate_campaign(name=name or out.resolve().name, **keywords)
         write_campaign(campaign, folder)
         if truth_file is not None:
-            write_truth(campaign, truth_file)
+            outputs.write_yaml(truth_file, campaign.truth)
     click.echo(f"campaign: {out} ({campaign.n_positions} positions)")
 
 

@@ -11,7 +11,7 @@ from typing import Annotated, Any, ClassVar, Literal, Self
 import numpy as np
 from pydantic import ConfigDict
 
-from accelstudy.files.outputs import whole_file
+from accelstudy.files.outputs import write_text
 from accelstudy.files.reading import read_json
 from accelstudy.files.validation import Described, Number, validate
 
@@ -76,8 +76,7 @@ class Document(Part):
     @classmethod
     def write(cls, folder: Path, content: Mapping[str, Any]) -> None:
         """Write the file into a folder, whole or not at all."""
-        with whole_file(folder / cls.file) as part:
-            part.write_text(json_text(content), encoding="utf-8")
+        write_text(folder / cls.file, json_text(content))
 
     @classmethod
     def refusal(cls) -> str:

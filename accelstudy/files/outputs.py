@@ -6,12 +6,13 @@ Everything is written to a temporary folder on the same disk first, and moved wh
 from __future__ import annotations
 
 import os
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass
 from errno import ENOTDIR
 from pathlib import Path
 from tempfile import TemporaryDirectory
+from typing import Any
 
 from accelstudy.basics.errors import InputError, reason_of
 
@@ -156,6 +157,19 @@ def whole_file(path: str | Path) -> Iterator[Path]:
         yield part
         path.parent.mkdir(parents=True, exist_ok=True)
         part.replace(path)
+
+
+def write_text(path: str | Path, text: str) -> None:
+    """Write a text in UTF-8, whole or not at all."""
+    with whole_file(path) as part:
+        part.write_text(text, encoding="utf-8")
+
+
+def write_yaml(path: str | Path, content: Mapping[str, Any], width: int = 80) -> None:
+    """Write YAML in the order of the keys, whole or not at all."""
+    import yaml  # a help text goes without
+
+    write_text(path, yaml.safe_dump(content, sort_keys=False, allow_unicode=True, width=width))
 
 
 def check_writable(folder: str | Path) -> None:

@@ -7,12 +7,11 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-import yaml
 
 from accelstudy.basics.plugins import file_key
 from accelstudy.campaign.sensor_type import TYPE_FILE, TypeFile
 from accelstudy.data_sheets import DataSheet
-from accelstudy.files.outputs import whole_file
+from accelstudy.files.outputs import write_yaml
 from accelstudy.lots.calibration import LotCalibration
 from accelstudy.lots.type_parameter import TypeParameter
 
@@ -60,10 +59,8 @@ def write_type(lot: LotCalibration, folder: Path) -> bool:
         "sensors": sensors,
         "parameters": parameters,
     })  # fmt: skip
-    with whole_file(folder / TYPE_FILE) as path:
-        content = {name: content[name] for name in (*sheet, *content)}  # name and title first
-        text = yaml.safe_dump(content, sort_keys=False, allow_unicode=True, width=96)
-        path.write_text(text, encoding="utf-8")
+    content = {name: content[name] for name in (*sheet, *content)}  # name and title first
+    write_yaml(folder / TYPE_FILE, content, width=96)
     return True
 
 

@@ -15,7 +15,7 @@ from jinja2 import Environment, PackageLoader, StrictUndefined, Undefined
 
 from accelstudy.basics import units, wording
 from accelstudy.basics.progress import failure
-from accelstudy.files.outputs import whole_file
+from accelstudy.files.outputs import write_text
 from accelstudy.files.reading import read_layer
 from accelstudy.sensors.frames import axes_note
 
@@ -104,8 +104,7 @@ def write_page(path: Path, template: str, fallback: str, **content: Any) -> None
             '<!DOCTYPE html>\n<html lang="en"><head><meta charset="utf-8"><title>Report</title>'
             f"</head>\n<body><p>{escape(fallback)}</p>\n<p>{escape(reason)}</p></body></html>\n"
         )
-    with whole_file(path) as part:
-        part.write_text(page, encoding="utf-8")
+    write_text(path, page)
 
 
 def render_text(template: str, **content: Any) -> str:

@@ -11,7 +11,6 @@ from typing import Any
 
 import numpy as np
 import pandas as pd
-import yaml
 from matplotlib.axes import Axes
 from numpy.linalg import LinAlgError
 
@@ -34,7 +33,7 @@ from accelstudy.diagnosis.result import MISSING, CampaignDiagnosis, TiltErrors
 from accelstudy.diagnosis.rules import RULES
 from accelstudy.drawing.saving import save_all
 from accelstudy.drawing.style import COLUMN
-from accelstudy.files.outputs import DIAGNOSIS, whole_file
+from accelstudy.files.outputs import DIAGNOSIS, write_yaml
 from accelstudy.files.tables import write_table
 from accelstudy.pages import write_page
 from accelstudy.pages.result import Result
@@ -287,9 +286,7 @@ class Diagnosis(Result):
             write_table(folder / "positions.parquet", self.positions)
             if content is not None:
                 CalibrationDocument.write(folder, content)
-            with whole_file(folder / "model.yaml") as path:
-                text = yaml.safe_dump(self.model_content, sort_keys=False, allow_unicode=True)
-                path.write_text(text, encoding="utf-8")
+            write_yaml(folder / "model.yaml", self.model_content)
             write_page(
                 folder / "report.html",
                 "diagnosis/report/report.html.j2",

@@ -10,7 +10,7 @@ from typing import Any
 import pandas as pd
 
 from accelstudy.drawing.saving import save_all
-from accelstudy.files.outputs import whole_file
+from accelstudy.files.outputs import write_text
 from accelstudy.files.tables import origin, write_table
 from studies.hidden.baselines import METHODS
 from studies.hidden.campaigns import Config, read_rows
@@ -39,8 +39,7 @@ def write_score(
     folder = Path(outputs["figures"])
     folder.mkdir(parents=True, exist_ok=True)
     save_all(figures(config.score, judged), folder)
-    with whole_file(outputs["page"]) as temporary:
-        temporary.write_text(page, encoding="utf-8")
+    write_text(outputs["page"], page)
     return page
 
 
