@@ -225,7 +225,7 @@ Columns = Annotated[
     Mapping[str, str | int] | str | None,
     COLUMNS,
     "Columns of fx, fy, fz, temperature and vibration, by name, or by number from 0: "
-    "fx=1,fy=2,fz=3.",
+    "fx=1,fy=2,fz=3; temperature=none takes none.",
 ]
 Time = Annotated[str | int | None, COLUMN, "Column of the time, by name or number."]
 TimeUnit = Annotated[

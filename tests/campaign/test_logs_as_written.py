@@ -141,6 +141,8 @@ def test_a_temperature_that_is_not_used_is_said(names):
     campaign = found(table(**dict.fromkeys(names, 290.5)))
     assert campaign.temperature is None
     assert f"temperature: which of {', '.join(names)}, in °C?" in said(campaign)
+    raw = table(**dict.fromkeys([*names, "temp"], -2950))
+    assert "temperature" not in said(found(raw, columns={"temperature": "none"}))
 
 
 @pytest.mark.parametrize(("prefix", "point", "seconds", "rest"), [

@@ -24,6 +24,8 @@ AXES = ("fx", "fy", "fz")
 SDS = ("sd_fx", "sd_fy", "sd_fz")
 CONDITIONS = ("temperature", "vibration")
 """Columns of a log besides time and forces."""
+NONE = "none"
+"""In place of the column of a condition: there is none, whatever the names say."""
 ANGLES = ("roll", "pitch", "yaw")
 MEANS = ("n_samples", *SDS, *ANGLES)
 """Columns that a table of means may have besides those of a log."""
@@ -116,6 +118,7 @@ def resolve_layout(
         for key, i in places.items()
         if key != "nanoseconds"
     }
+    by_name |= {key: NONE for key, column in chosen.columns.items() if column == NONE}
     found = {"time": by_name.pop("time", None), "columns": by_name}
     return chosen.model_copy(update=found), places
 
@@ -147,6 +150,8 @@ def _find_places(
         columns = {**columns, **dict(zip(AXES, range(3), strict=True))}
     places: dict[str, int] = {}
     for key in wanted:
+        if key in CONDITIONS and columns.get(key) == NONE:
+            continue
         try:
             place = _find(raw, key, columns.get(key))
         except InputError:

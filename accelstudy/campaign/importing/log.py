@@ -24,6 +24,7 @@ from accelstudy.campaign.importing.columns import (
     AXES,
     CONDITIONS,
     MEANS,
+    NONE,
     resolve_layout,
     time_columns,
     unit_in,
@@ -151,9 +152,8 @@ class Log:
         for key in [key for key in self.conditions if key in conditions]:
             usual = float(self.samples[key][:SAMPLED_ROWS].median())
             if np.isfinite(usual):
-                COLUMNS[key].within.check_key(
-                    f"{self.path}: column {self.used[key]} ({key})", usual
-                )
+                column = f"{self.used[key]} ({key}; `columns` {key}={NONE} takes none)"
+                COLUMNS[key].within.check_key(f"{self.path}: column {column}", usual)
 
     def warnings(self) -> list[str]:
         """What could not be read."""

@@ -309,7 +309,7 @@ def _notes(holds: Holds, layout: LogLayout, reference: str, rounded: bool) -> tu
         holds,
         log,
         layout=layout,
-        used={"time": "", "temperature": ""} | log.used,
+        used={"time": "", "temperature": "", **layout.columns, **log.used},
         heat=[log.raw.labels[place] for place in thermometers(log.raw.names)],
         reference=reference,
         seconds=time[-1] - time[0],
