@@ -17,10 +17,9 @@ from accelstudy.adjustment.gauss_helmert import (
 )
 from accelstudy.adjustment.observations import Observations
 from accelstudy.approaches import Approach
+from accelstudy.basics.arrays import Array
 from accelstudy.basics.errors import InputError
 from accelstudy.sensors.sensor import SensorModel
-
-Array = NDArray[np.float64]
 
 AT_ONCE = 100_000
 """Positions, of all sessions together, that are adjusted at once; more would only take memory."""

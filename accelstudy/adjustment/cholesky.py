@@ -8,9 +8,8 @@ batch.
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
+from accelstudy.basics.arrays import Array
 
 
 def factor(matrices: Array, tolerance: float = 0.0) -> Array:

@@ -16,14 +16,12 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from accelstudy.adjustment.observations import Observations
 from accelstudy.adjustment.quality import Solution, solve
 from accelstudy.approaches import Approach
+from accelstudy.basics.arrays import Array
 from accelstudy.sensors.sensor import SensorModel
-
-Array = NDArray[np.float64]
 
 MAX_STEPS = 300
 MAX_FITS = 10

@@ -21,10 +21,11 @@ from functools import cache, cached_property
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from accelstudy.adjustment.gauss_helmert import Linearisation
 from accelstudy.approaches import Approach
+from accelstudy.basics.arrays import Array
 from accelstudy.basics.units import STANDARD_GRAVITY
 from accelstudy.effects import HoldConditions
 from accelstudy.sensors.trace import SensorTrace
@@ -38,8 +39,6 @@ from accelstudy.symbolic.tracing import (
     symbols,
     traced,
 )
-
-Array = NDArray[np.float64]
 
 
 class CalibrationEquations:

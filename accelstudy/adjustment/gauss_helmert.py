@@ -20,9 +20,8 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from accelstudy.adjustment import cholesky
+from accelstudy.basics.arrays import Array
 from accelstudy.basics.errors import InputError
-
-Array = NDArray[np.float64]
 
 MAX_ITERATIONS = 30
 STEP_TOLERANCE = 1e-6

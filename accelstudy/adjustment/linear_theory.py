@@ -10,16 +10,14 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from accelstudy.adjustment import cholesky
 from accelstudy.adjustment.calibration import CalibrationProblem, calibrate
 from accelstudy.adjustment.gauss_helmert import whiten
 from accelstudy.adjustment.observations import Observations
 from accelstudy.approaches import Approach
+from accelstudy.basics.arrays import Array
 from accelstudy.sensors.sensor import SensorModel
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)

@@ -9,11 +9,9 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from accelstudy.basics.arrays import Array
 from accelstudy.basics.units import STANDARD_GRAVITY
 from accelstudy.effects import HoldConditions
-
-Array = NDArray[np.float64]
-
 
 AngleErrors = Callable[[Array], tuple[Array, Array]]
 Known = Mapping[str, tuple[float, float]]

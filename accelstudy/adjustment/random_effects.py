@@ -10,10 +10,9 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy import optimize, special, stats
 
-Array = NDArray[np.float64]
+from accelstudy.basics.arrays import Array
 
 POINTS = 50
 """Scatters that `log_evidence` tries."""

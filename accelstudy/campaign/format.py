@@ -12,6 +12,7 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
+from accelstudy.basics.arrays import Array
 from accelstudy.basics.errors import InputError, at, brief, did_you_mean
 from accelstudy.basics.wording import one_line, short_list
 from accelstudy.campaign.columns import COLUMNS, KEYS, Columns, table_of
@@ -22,7 +23,6 @@ from accelstudy.files.outputs import write_text, write_yaml
 from accelstudy.files.reading import read_layer, read_text
 from accelstudy.files.validation import validate
 
-Array = NDArray[np.float64]
 Table = Mapping[str, Sequence[Any]]
 """The table of positions by name: texts of its file, or numbers that are to be written."""
 

@@ -11,16 +11,14 @@ from functools import cached_property
 from typing import Annotated, Self
 
 import numpy as np
-from numpy.typing import NDArray
 from pydantic import AfterValidator, Field, model_validator
 
+from accelstudy.basics.arrays import Array
 from accelstudy.files.validation import ConfigSection, Finite, SigmaForce
 from accelstudy.leveling.angles import jacobian, specific_force
 from accelstudy.sensors.frames import Frame, parse_frame
 from accelstudy.sensors.models import compose
 from accelstudy.sensors.sensor import SensorModel
-
-Array = NDArray[np.float64]
 
 MIN_POLE_DISTANCE = 1e-4
 """rad; nearer to the pole of roll its derivatives are those at this distance."""

@@ -9,8 +9,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from accelstudy.basics.arrays import Array
 from accelstudy.basics.errors import InputError, key
 from accelstudy.basics.units import GON
 from accelstudy.campaign.gross_errors.recognition import check_size
@@ -25,7 +25,6 @@ from accelstudy.sensors.frames import Frame
 if TYPE_CHECKING:
     from accelstudy.campaign.calibration.sensor_calibration import SensorCalibration
 
-Array = NDArray[np.float64]
 
 KEYWORDS = ("reference_log", "reference", "reference_columns", "reference_offset")
 """Keywords of an import by which a reference is given."""

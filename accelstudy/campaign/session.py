@@ -19,8 +19,6 @@ from accelstudy.campaign.sensor_type import SensorType
 from accelstudy.effects import HoldConditions
 from accelstudy.files.validation import validate
 
-Array = NDArray[np.float64]
-
 
 def _of_holds(attribute: str) -> cached_property[Any]:
     """Array of the columns of an attribute, of the holds that are used; None without them."""

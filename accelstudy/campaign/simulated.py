@@ -9,10 +9,10 @@ from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from accelstudy.approaches import get_approach
 from accelstudy.basics import bounds
+from accelstudy.basics.arrays import Array
 from accelstudy.basics.errors import InputError, UnknownNameError
 from accelstudy.basics.registry import WithSettings
 from accelstudy.basics.units import MGON
@@ -23,8 +23,6 @@ from accelstudy.schemes import get_scheme
 from accelstudy.sensors.models import compose, get_model
 from accelstudy.simulation.hold_plan import PROVIDES, HoldPlan
 from accelstudy.simulation.sessions import Noise, session
-
-Array = NDArray[np.float64]
 
 STREAMS = ("sensor", "effects", "order", "noise", "sd")
 """Streams of random numbers, one for each kind of draw, so that none changes another."""

@@ -9,14 +9,12 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from accelstudy.basics.arrays import Array
 from accelstudy.design.criteria import Criterion
 from accelstudy.design.newton import settle
 from accelstudy.design.spaces import Attitudes
 from accelstudy.design.task import Task
-
-Array = NDArray[np.float64]
 
 SHARED_ATTITUDES, BOUND_ATTITUDES = 600, 6000
 """Number of attitudes that have shares, and of those on which the bound is evaluated."""

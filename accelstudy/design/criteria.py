@@ -19,12 +19,11 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from accelstudy.basics.arrays import Array
 from accelstudy.basics.errors import UnknownNameError
 from accelstudy.design.task import Task
-
-Array = NDArray[np.float64]
 
 RIDGE = 1e-12
 """Added to scaled normal matrices, so that a singular one gives a huge variance, not an error."""

@@ -5,10 +5,10 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from accelstudy.adjustment.observations import Known
 from accelstudy.approaches import Approach
+from accelstudy.basics.arrays import Array
 from accelstudy.basics.units import STANDARD_GRAVITY
 from accelstudy.design.information import Information, position_rows, prior_rows, rank_of
 from accelstudy.effects import HoldConditions
@@ -17,8 +17,6 @@ from accelstudy.positions.scheme import Scheme
 from accelstudy.sensors.sensor import SensorModel
 from accelstudy.simulation.hold_plan import HoldPlan
 from accelstudy.simulation.sessions import Noise
-
-Array = NDArray[np.float64]
 
 ABOVE_NOISE = 3.0
 """How far a combination of parameters must show above what the noise of readings makes of it. Where

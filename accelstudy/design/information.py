@@ -20,6 +20,7 @@ from accelstudy.adjustment.equations import equations_of
 from accelstudy.adjustment.gauss_helmert import whitened_design
 from accelstudy.adjustment.observations import AngleErrors, Known
 from accelstudy.approaches import Approach
+from accelstudy.basics.arrays import Array
 from accelstudy.basics.errors import InputError
 from accelstudy.basics.units import STANDARD_GRAVITY
 from accelstudy.effects import HoldConditions
@@ -28,8 +29,6 @@ from accelstudy.leveling.distribution import NOISE, Tilt
 from accelstudy.leveling.error import TiltError
 from accelstudy.sensors.sensor import SensorModel
 from accelstudy.simulation.sessions import Noise
-
-Array = NDArray[np.float64]
 
 SINGULAR = 1e-7
 """Singular values of the scaled design matrix below this fraction of the largest count as zero."""

@@ -18,13 +18,11 @@ from __future__ import annotations
 from typing import Protocol
 
 import numpy as np
-from numpy.typing import NDArray
 
+from accelstudy.basics.arrays import Array
 from accelstudy.design.spaces import Attitudes, angles_to, directions_at
 from accelstudy.design.task import Task
 from accelstudy.positions.choice import first_best
-
-Array = NDArray[np.float64]
 
 WIDTH = 1e-2
 """rad, of the differences."""

@@ -5,10 +5,10 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from accelstudy.basics.arrays import Array
 from accelstudy.design.task import Task
 from accelstudy.positions.choice import first_best
 
-Array = NDArray[np.float64]
 Order = NDArray[np.int_]
 
 TOURS = 12

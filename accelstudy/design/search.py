@@ -11,8 +11,8 @@ from dataclasses import dataclass, field
 from functools import cached_property
 
 import numpy as np
-from numpy.typing import NDArray
 
+from accelstudy.basics.arrays import Array
 from accelstudy.basics.errors import InputError
 from accelstudy.basics.units import GON
 from accelstudy.design.continuous import continuous_optimum
@@ -21,8 +21,6 @@ from accelstudy.design.newton import settle
 from accelstudy.design.spaces import Attitudes
 from accelstudy.design.task import Task
 from accelstudy.positions.choice import CRITERION_TOLERANCE, first_best, stable_order
-
-Array = NDArray[np.float64]
 
 CANDIDATES = 600
 STARTS = 8

@@ -7,15 +7,13 @@ from dataclasses import dataclass
 from functools import cached_property, partial
 
 import numpy as np
-from numpy.typing import NDArray
 
+from accelstudy.basics.arrays import Array
 from accelstudy.basics.errors import InputError, UnknownNameError
 from accelstudy.basics.units import GON, attitude_unit, to_attitude
 from accelstudy.leveling.angles import angles_of, specific_force
 from accelstudy.positions.points import corners, edges, evenly_spread, faces
 from accelstudy.schemes import get_scheme
-
-Array = NDArray[np.float64]
 
 TOLERANCE = 1e-7
 """rad, by which rounding may break a constraint."""

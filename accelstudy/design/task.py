@@ -6,9 +6,10 @@ from dataclasses import dataclass, field
 from functools import cached_property
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from accelstudy.approaches import Approach
+from accelstudy.basics.arrays import Array
 from accelstudy.basics.errors import InputError
 from accelstudy.basics.levels import MAX_TILT_GON
 from accelstudy.basics.units import GON
@@ -20,8 +21,6 @@ from accelstudy.positions.scheme import Scheme
 from accelstudy.sensors.sensor import SensorModel
 from accelstudy.simulation.hold_plan import HoldPlan, check_needs_no_plan
 from accelstudy.simulation.sessions import Noise
-
-Array = NDArray[np.float64]
 
 SPHERE = 300
 """Attitudes that stand for the whole sphere."""

@@ -13,8 +13,8 @@ from dataclasses import replace
 from typing import TypeAlias
 
 import numpy as np
-from numpy.typing import NDArray
 
+from accelstudy.basics.arrays import Array
 from accelstudy.basics.units import GON
 from accelstudy.design.information import Information, position_rows
 from accelstudy.diagnosis.file_format import NextPosition
@@ -27,8 +27,6 @@ from accelstudy.schemes import get_scheme
 from accelstudy.sensors.models import compose
 from accelstudy.sensors.sensor import SensorModel
 from accelstudy.simulation.sessions import Noise
-
-Array = NDArray[np.float64]
 
 COUNT = 3
 CANDIDATE_SCHEME = "fibonacci-60"

@@ -7,10 +7,10 @@ from typing import NamedTuple
 
 import numpy as np
 import pandas as pd
-from numpy.typing import NDArray
 
 from accelstudy.adjustment.quality import POWER, noncentrality, solve
 from accelstudy.approaches import Approach
+from accelstudy.basics.arrays import Array
 from accelstudy.basics.shares import sigmas_95
 from accelstudy.basics.units import display_unit
 from accelstudy.basics.wording import amount
@@ -25,8 +25,6 @@ from accelstudy.schemes import Scheme
 from accelstudy.sensors.sensor import SensorModel
 from accelstudy.simulation.hold_plan import check_needs_no_plan
 from accelstudy.simulation.sessions import Noise, session
-
-Array = NDArray[np.float64]
 
 
 class Visibility(NamedTuple):

@@ -7,8 +7,8 @@ from functools import cache
 from typing import Any, ClassVar
 
 import numpy as np
-from numpy.typing import NDArray
 
+from accelstudy.basics.arrays import Array
 from accelstudy.basics.errors import InputError
 from accelstudy.basics.registry import Setting
 from accelstudy.effects.base import Effect, Parameter, get_effect, unlisted
@@ -22,8 +22,6 @@ from accelstudy.effects.smooth import (
     sines,
     spectrum,
 )
-
-Array = NDArray[np.float64]
 
 LEARNED = "learned"
 MIN_VARIANCE_SHARE = 5e-3

@@ -10,9 +10,9 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
-Array = NDArray[np.float64]
+from accelstudy.basics.arrays import Array
 
 LENGTHS = (0.25, 0.6, 1.5)
 """Length scales, of a coordinate that goes from −1 to 1, of an angle in rad, or of a direction."""

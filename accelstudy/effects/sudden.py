@@ -4,13 +4,11 @@ from collections.abc import Sequence
 from typing import Any, ClassVar, Self
 
 import numpy as np
-from numpy.typing import NDArray
 
+from accelstudy.basics.arrays import Array
 from accelstudy.basics.registry import Setting
 from accelstudy.effects.base import Effect
 from accelstudy.effects.components import Number
-
-Array = NDArray[np.float64]
 
 MAX_TIMES = 100
 """Number of times up to which all are tried."""

@@ -21,15 +21,14 @@ from dataclasses import dataclass
 from functools import cache, cached_property
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 from scipy import optimize, special, stats
 from scipy.stats import qmc
 
 from accelstudy.adjustment.quality import noncentrality
+from accelstudy.basics.arrays import Array
 from accelstudy.epochs.file_format import Test
 from accelstudy.positions.choice import first_best
-
-Array = NDArray[np.float64]
 
 LEVEL = 0.05
 """Level of the test, and of the search for what changed as a whole."""

@@ -21,15 +21,13 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy import special, stats
 
 from accelstudy.adjustment.random_effects import RandomEffects
+from accelstudy.basics.arrays import Array
 from accelstudy.basics.shares import sigmas_95
 from accelstudy.epochs.congruence import LEVEL, dof_of_squares, f_tail
 from accelstudy.epochs.file_format import Rate, Scatter, Step
-
-Array = NDArray[np.float64]
 
 YEAR = 365.25 * 86400.0
 """s"""

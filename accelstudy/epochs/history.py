@@ -16,6 +16,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
+from accelstudy.basics.arrays import Array
 from accelstudy.basics.dates import read_date
 from accelstudy.basics.errors import InputError, at, key
 from accelstudy.basics.units import GON, MGON, shown_unit, to_display
@@ -31,8 +32,6 @@ from accelstudy.files.outputs import HISTORY
 from accelstudy.leveling.error import ATTITUDES, TiltError, cap_forces, tilt_error
 from accelstudy.pages import render_lines, write_page
 from accelstudy.pages.result import Result
-
-Array = NDArray[np.float64]
 
 MIN_COURSE = 3
 """Calibrations of which a line leaves a degree of freedom."""

@@ -15,16 +15,15 @@ from functools import cached_property
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy import optimize
 
+from accelstudy.basics.arrays import Array
 from accelstudy.basics.units import GON, MGON
 from accelstudy.epochs.course import YEAR
 
 if TYPE_CHECKING:
     from accelstudy.epochs.history import History
 
-Array = NDArray[np.float64]
 
 DRAWS = 4000
 SEED = 1

@@ -10,19 +10,17 @@ from typing import Any
 import llvmlite
 import llvmlite.binding as llvm
 import numpy as np
-from numpy.typing import NDArray
 
 from accelstudy.adjustment.calibration import Block, CalibrationProblem
 from accelstudy.adjustment.equations import CalibrationEquations
 from accelstudy.adjustment.gauss_helmert import redundancy_of
 from accelstudy.adjustment.observations import Observations
 from accelstudy.approaches import Approach
+from accelstudy.basics.arrays import Array
 from accelstudy.files.cache import cached
 from accelstudy.kernel.lanes import LANES
 from accelstudy.kernel.writing import INTEGERS, NAME, POINTERS, KernelFunction, text_of
 from accelstudy.sensors.sensor import SensorModel
-
-Array = NDArray[np.float64]
 
 KIND = "kernels"
 """Under which compiled functions are kept."""

@@ -11,11 +11,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from accelstudy.basics.arrays import Array
 from accelstudy.effects import HoldConditions
 from accelstudy.effects.components import Number, Vector
 from accelstudy.sensors.sensor import SensorModel
-
-Array = NDArray[np.float64]
 
 MAX_CURVATURE = 0.2
 """Size of the terms of second order, beside those of first order, beyond which standard deviations

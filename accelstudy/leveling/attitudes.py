@@ -3,13 +3,11 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
+from accelstudy.basics.arrays import Array
 from accelstudy.basics.units import attitude_unit, to_attitude
 from accelstudy.leveling.angles import roll_pitch
 from accelstudy.sensors.frames import FRD, Frame
-
-Array = NDArray[np.float64]
 
 LEVEL = np.radians(0.5)
 """An axis within this of the horizon is level, one within this of the vertical straight up or

@@ -7,11 +7,10 @@ from functools import cached_property
 
 import numpy as np
 import scipy
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from accelstudy.basics.arrays import Array
 from accelstudy.leveling.error import TiltError
-
-Array = NDArray[np.float64]
 
 FROM = (0.9, 0.5, 0.2, 0.02, 0.0)
 INEXACT = {True: (5e-4, 2e-3, 6e-3, 0.02, 0.08), False: (4e-3, 0.015, 0.02, np.inf, np.inf)}

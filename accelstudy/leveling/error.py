@@ -6,15 +6,13 @@ import math
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from accelstudy.basics.arrays import Array
 from accelstudy.basics.levels import MAX_TILT_GON
 from accelstudy.basics.units import GON, STANDARD_GRAVITY
 from accelstudy.effects import HoldConditions
 from accelstudy.leveling.angles import angles_of, roll_pitch, tilt_slope, wrap_angle
 from accelstudy.sensors.sensor import SensorModel
-
-Array = NDArray[np.float64]
 
 ATTITUDES = 200
 """Least number of attitudes over which a tilt error is averaged, unless another is given."""

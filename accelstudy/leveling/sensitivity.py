@@ -17,15 +17,14 @@ from itertools import product
 
 import numpy as np
 import pandas as pd
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from accelstudy.basics.arrays import Array
 from accelstudy.basics.shares import Z95
 from accelstudy.basics.units import GON, MGON, STANDARD_GRAVITY
 from accelstudy.leveling.angles import angles_of, specific_force, wrap_angle
 from accelstudy.sensors.models import compose
 from accelstudy.sensors.sensor import SensorModel
-
-Array = NDArray[np.float64]
 
 FORCES = ("f_x", "f_y", "f_z")
 OUTPUTS = ("roll", "pitch")

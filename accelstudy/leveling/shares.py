@@ -27,12 +27,11 @@ import numpy as np
 import pandas as pd
 from numpy.typing import ArrayLike, NDArray
 
+from accelstudy.basics.arrays import Array
 from accelstudy.basics.units import GON, STANDARD_GRAVITY
 from accelstudy.leveling.angles import specific_force, tilt_by_output, tilt_slope
 from accelstudy.leveling.sensitivity import FORCES, NEGLIGIBLE_VARIANCE, effects_table
 from accelstudy.sensors.sensor import SensorModel
-
-Array = NDArray[np.float64]
 
 LINEAR_UP_TO = 0.01
 """Sd of roll and pitch, rad, up to which linear theory gives their variance to 3e-4 of it. Beyond,

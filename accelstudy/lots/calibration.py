@@ -8,8 +8,8 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
-from numpy.typing import NDArray
 
+from accelstudy.basics.arrays import Array
 from accelstudy.basics.errors import InputError
 from accelstudy.basics.levels import MAX_TILT_GON
 from accelstudy.basics.units import MGON
@@ -22,8 +22,6 @@ from accelstudy.lots.passes import LotEffect
 from accelstudy.lots.type_parameter import TypeParameter
 from accelstudy.sensors.models import compose
 from accelstudy.sensors.sensor import SensorModel
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True, eq=False)

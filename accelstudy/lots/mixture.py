@@ -22,12 +22,10 @@ from functools import cached_property
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy import special
 
+from accelstudy.basics.arrays import Array
 from accelstudy.lots.sizes import TypicalSize
-
-Array = NDArray[np.float64]
 
 PRIOR_ODD = 0.01
 """Prior probability that a sensor is odd."""

@@ -9,9 +9,9 @@ from functools import cached_property
 from typing import TYPE_CHECKING, Any, NamedTuple, TypeAlias
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy import stats
 
+from accelstudy.basics.arrays import Array
 from accelstudy.basics.progress import track
 from accelstudy.diagnosis.evidence.candidates import UNKNOWN
 from accelstudy.diagnosis.evidence.noise import NOISES
@@ -25,7 +25,6 @@ from accelstudy.lots.sizes import LotResiduals, ShownEffect
 if TYPE_CHECKING:
     from accelstudy.lots.type_parameter import TypeParameter
 
-Array = NDArray[np.float64]
 Mapped: TypeAlias = Callable[..., Iterator[Any]]
 """Maps a function over sensors, in one process or in several."""
 

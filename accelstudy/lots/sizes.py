@@ -24,9 +24,9 @@ from operator import attrgetter
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy import stats
 
+from accelstudy.basics.arrays import Array
 from accelstudy.basics.errors import InputError
 from accelstudy.diagnosis.evidence.size import (
     SIZE_WEIGHTS,
@@ -38,8 +38,6 @@ from accelstudy.diagnosis.evidence.size import (
 from accelstudy.diagnosis.rules import RULES
 from accelstudy.diagnosis.space.frame import SessionFit
 from accelstudy.effects import get_effect
-
-Array = NDArray[np.float64]
 
 SCATTERS = (0.0, 0.25, 1.0)
 """τ, scatter of the parameters of a type in parts of their size; beyond, each sensor has its own

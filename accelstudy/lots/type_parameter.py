@@ -10,11 +10,10 @@ from matplotlib.axes import Axes
 from numpy.typing import NDArray
 
 from accelstudy.adjustment.random_effects import RandomEffects
+from accelstudy.basics.arrays import Array
 from accelstudy.basics.units import shown_unit, to_display
 from accelstudy.campaign.calibration.figures import SUSPECT
 from accelstudy.drawing.style import INK, MISSING, group_colour, group_of, symbol
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True, eq=False)

@@ -4,9 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 
+from accelstudy.basics.arrays import Array
 from accelstudy.basics.registry import Setting
 from accelstudy.effects import HoldConditions
-from accelstudy.noise_effects.base import Array, NoiseEffect, register
+from accelstudy.noise_effects.base import NoiseEffect, register
 
 
 @register

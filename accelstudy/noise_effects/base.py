@@ -11,12 +11,10 @@ from functools import cache
 from typing import ClassVar
 
 import numpy as np
-from numpy.typing import NDArray
 
+from accelstudy.basics.arrays import Array
 from accelstudy.basics.registry import RegistryWithSettings, WithSettings
 from accelstudy.effects import HoldConditions
-
-Array = NDArray[np.float64]
 
 
 class NoiseEffect(WithSettings):

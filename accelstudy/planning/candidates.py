@@ -9,10 +9,10 @@ from functools import cache, partial
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 
 from accelstudy.approaches import get_approach
 from accelstudy.basics.arguments import tidy
+from accelstudy.basics.arrays import Array
 from accelstudy.basics.progress import track
 from accelstudy.design.information import Information, position_rows
 from accelstudy.design.search import Search
@@ -29,7 +29,6 @@ from accelstudy.simulation.sessions import Noise
 if TYPE_CHECKING:
     from accelstudy.planning.simulated import SimulatedTilt
 
-Array = NDArray[np.float64]
 
 PLANNED_MODELS = (
     *MODELS,

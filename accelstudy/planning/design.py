@@ -12,12 +12,12 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import pandas as pd
 import yaml
-from numpy.typing import NDArray
 
 from accelstudy import __version__
 from accelstudy.approaches import get_approach
 from accelstudy.basics import bounds, units
 from accelstudy.basics.arguments import tidy
+from accelstudy.basics.arrays import Array
 from accelstudy.basics.errors import InputError, key
 from accelstudy.basics.names import path_name
 from accelstudy.basics.progress import say, show, stage
@@ -37,7 +37,6 @@ from accelstudy.simulation.sessions import Noise
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-Array = NDArray[np.float64]
 
 REFERENCE = "mclaren-24"
 

@@ -5,9 +5,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from accelstudy.approaches import get_approach
+from accelstudy.basics.arrays import Array
 from accelstudy.basics.units import STANDARD_GRAVITY
 from accelstudy.effects import get_effect
 from accelstudy.leveling.distribution import NOISE, Tilt
@@ -18,8 +18,6 @@ from accelstudy.simulation.sessions import Noise
 from accelstudy.study.cell import Cell
 from accelstudy.study.compiling import with_compiled
 from accelstudy.study.statistics import TILT, TILTS, CellStatistics, simulated_statistics
-
-Array = NDArray[np.float64]
 
 SIGNS = np.array([1.0, -1.0, 1.0])
 """Signs of the parameters of the three axes of the simulated sensor; all have the usual size."""

@@ -4,7 +4,8 @@ from itertools import product
 
 import numpy as np
 
-from accelstudy.positions.scheme import Array, unit_vectors
+from accelstudy.basics.arrays import Array
+from accelstudy.positions.scheme import unit_vectors
 
 GOLDEN_ANGLE = np.pi * (3 - np.sqrt(5))
 

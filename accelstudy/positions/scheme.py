@@ -6,9 +6,10 @@ from dataclasses import dataclass, replace
 from typing import Literal
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
-Array = NDArray[np.float64]
+from accelstudy.basics.arrays import Array
+
 Status = Literal["exact", "standard", "stand-in", "generated"]
 
 

@@ -2,8 +2,8 @@
 
 import numpy as np
 
+from accelstudy.basics.arrays import Array
 from accelstudy.positions.points import GOLDEN_ANGLE, fibonacci, shuffle, spiral
-from accelstudy.positions.scheme import Array
 from accelstudy.schemes.registry import register
 
 register(

@@ -4,7 +4,7 @@ from itertools import permutations, product
 
 import numpy as np
 
-from accelstudy.positions.scheme import Array
+from accelstudy.basics.arrays import Array
 from accelstudy.schemes.polyhedra import generic
 from accelstudy.schemes.registry import register
 

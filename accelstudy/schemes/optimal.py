@@ -8,8 +8,8 @@ from typing import Any
 
 import numpy as np
 
+from accelstudy.basics.arrays import Array
 from accelstudy.basics.errors import InputError
-from accelstudy.positions.scheme import Array
 from accelstudy.schemes.registry import register
 
 TABLE = Path(__file__).with_name("optimal.json")

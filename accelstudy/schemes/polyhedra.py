@@ -2,8 +2,8 @@
 
 import numpy as np
 
+from accelstudy.basics.arrays import Array
 from accelstudy.positions.points import corners, cyclic_permutations, edges, faces
-from accelstudy.positions.scheme import Array
 from accelstudy.schemes.registry import register
 
 GOLDEN_RATIO = (1 + np.sqrt(5)) / 2

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from accelstudy.positions.scheme import Array
+from accelstudy.basics.arrays import Array
 from accelstudy.schemes.registry import register
 
 

@@ -5,12 +5,11 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from accelstudy.basics.arrays import Array
 from accelstudy.basics.errors import InputError, UnknownNameError
 from accelstudy.basics.units import SENSOR_UNITS, STANDARD_GRAVITY, UNITS
-
-Array = NDArray[np.float64]
 
 MAX_VALUE = 1e15
 """No acceleration or time is larger, and squares of larger numbers overflow."""

@@ -14,9 +14,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from accelstudy.basics.arrays import Array
 from accelstudy.basics.errors import InputError
-
-Array = NDArray[np.float64]
 
 WAYS = {"f": "forward", "b": "back", "r": "right", "l": "left", "d": "down", "u": "up"}
 """Where an axis points, by the letter of a frame; ways along the axes of frd come first."""

@@ -8,13 +8,11 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
+from accelstudy.basics.arrays import Array
 from accelstudy.basics.units import STANDARD_GRAVITY, display_unit
 from accelstudy.basics.wording import amount
 from accelstudy.effects import Effect, get_effect
-
-Array = NDArray[np.float64]
 
 MAX_FACTOR = 20.0
 """Multiple of the typical size of cheap equipment beyond which a parameter is implausible."""

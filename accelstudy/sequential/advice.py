@@ -12,6 +12,7 @@ import pandas as pd
 from numpy.typing import NDArray
 
 from accelstudy.approaches import Approach
+from accelstudy.basics.arrays import Array
 from accelstudy.basics.levels import IMPLAUSIBLE, REJECTED
 from accelstudy.basics.progress import show, warn
 from accelstudy.basics.units import attitude_unit, to_attitude
@@ -29,7 +30,6 @@ from accelstudy.sequential.promise import LEAST_REDUNDANCY, Promise
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-Array = NDArray[np.float64]
 
 SENTENCES = "sequential/wording.txt.j2"
 

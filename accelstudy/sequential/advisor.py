@@ -6,11 +6,11 @@ from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
 from accelstudy.adjustment.calibration import CalibrationProblem
 from accelstudy.approaches import Approach, get_approach
 from accelstudy.basics import suggestions
+from accelstudy.basics.arrays import Array
 from accelstudy.basics.errors import InputError
 from accelstudy.basics.levels import IMPLAUSIBLE, REJECTED
 from accelstudy.campaign.calibration.campaign_fit import CampaignFit
@@ -42,8 +42,6 @@ from accelstudy.sequential.choice import (
     typical_sizes,
 )
 from accelstudy.sequential.promise import LEAST_REDUNDANCY, Promise, bound, known_variance
-
-Array = NDArray[np.float64]
 
 KNOWN_RATIO = 0.5
 """Ratio of sigma to the typical size of a parameter, up to which it counts as known at all."""

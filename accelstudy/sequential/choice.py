@@ -11,8 +11,8 @@ from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from accelstudy.basics.arrays import Array
 from accelstudy.basics.errors import InputError
 from accelstudy.basics.units import GON
 from accelstudy.design.information import Information
@@ -20,8 +20,6 @@ from accelstudy.design.spaces import find_attitudes
 from accelstudy.leveling.error import TiltError
 from accelstudy.sensors.sensor import SensorModel
 from accelstudy.sequential.promise import Promise
-
-Array = NDArray[np.float64]
 
 EQUAL_GAIN = 0.99
 """Candidates whose gain is above this fraction of the largest are equally good, and the first is

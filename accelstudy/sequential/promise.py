@@ -21,12 +21,11 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy import special
 
+from accelstudy.basics.arrays import Array
 from accelstudy.basics.units import STANDARD_GRAVITY
 from accelstudy.effects import HoldConditions
 from accelstudy.leveling.error import ATTITUDES, TiltError, cap_forces, holds_in_use, tilt_error
 from accelstudy.sensors.sensor import SensorModel
-
-Array = NDArray[np.float64]
 
 LEVEL = 0.975
 """Level of the upper confidence bound of the variance at each look, for 0.95 over all looks."""

@@ -5,16 +5,14 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from accelstudy.basics import bounds
+from accelstudy.basics.arrays import Array
 from accelstudy.basics.errors import InputError, UnknownNameError
 from accelstudy.effects import Effect, HoldConditions
 from accelstudy.leveling.angles import roll_pitch
 from accelstudy.sensors.models import compose
 from accelstudy.sensors.sensor import SensorModel
-
-Array = NDArray[np.float64]
 
 CHOICES = {"temperature_order": ("linear", "ABBA", "random"), "yaw": ("none", "random")}
 RANGES = {"temperature": bounds.TEMPERATURE, "vibration": bounds.VIBRATION}

@@ -7,17 +7,15 @@ from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from accelstudy.adjustment import Observations
 from accelstudy.adjustment.observations import AngleErrors
+from accelstudy.basics.arrays import Array
 from accelstudy.basics.units import MGON, STANDARD_GRAVITY
 from accelstudy.effects import HoldConditions
 from accelstudy.leveling.angles import angles_of
 from accelstudy.noise_effects import get_noise_effect
 from accelstudy.sensors.sensor import SensorModel
-
-Array = NDArray[np.float64]
 
 BLOCK = 500
 """Sessions that are drawn and adjusted together; few enough for the processor's cache."""

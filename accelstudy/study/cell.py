@@ -10,10 +10,10 @@ from functools import cached_property
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from accelstudy.adjustment.linear_theory import LinearTheory
 from accelstudy.approaches import Approach, get_approach
+from accelstudy.basics.arrays import Array
 from accelstudy.basics.levels import MAX_TILT_GON
 from accelstudy.basics.units import GON, MGON
 from accelstudy.design.estimability import Estimability, estimability
@@ -24,8 +24,6 @@ from accelstudy.sensors.models import compose
 from accelstudy.sensors.sensor import SensorModel
 from accelstudy.simulation.hold_plan import HoldPlan
 from accelstudy.simulation.sessions import Noise, Session, session
-
-Array = NDArray[np.float64]
 
 MEGABYTES, BYTES_PER_ESTIMATE = 1000, 150
 """Memory of a job: at least, and for each estimate of its largest cell."""

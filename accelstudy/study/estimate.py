@@ -25,7 +25,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-Array = NDArray[np.float64]
+from accelstudy.basics.arrays import Array
 
 MIN_REPLICATES = 20
 """Replicates from which on a coefficient is estimated; fewer are only averaged."""

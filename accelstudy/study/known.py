@@ -7,13 +7,11 @@ from functools import cached_property
 
 import numpy as np
 import scipy
-from numpy.typing import NDArray
 
 from accelstudy.adjustment.linear_theory import LinearTheory
+from accelstudy.basics.arrays import Array
 from accelstudy.leveling.distribution import TiltDistribution
 from accelstudy.study.cell import Cell
-
-Array = NDArray[np.float64]
 
 CENTRAL = 1e-6
 """Offsets below this share of a standard deviation, and an Ω below it, count as none."""

@@ -9,16 +9,14 @@ from typing import NamedTuple
 
 import numpy as np
 import pyarrow as pa
-from numpy.typing import NDArray
 
 from accelstudy.adjustment.calibration import Block
 from accelstudy.adjustment.linear_theory import LinearTheory
 from accelstudy.adjustment.observations import Observations
+from accelstudy.basics.arrays import Array
 from accelstudy.simulation.sessions import BLOCK, Errors
 from accelstudy.study.cell import Cell
 from accelstudy.study.compiling import calibrator
-
-Array = NDArray[np.float64]
 
 CHUNK = 20_000
 """Replicates that are calibrated and stored together; more would only take memory."""

@@ -7,9 +7,9 @@ from dataclasses import dataclass, field
 from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from accelstudy.adjustment.calibration import Block
+from accelstudy.basics.arrays import Array
 from accelstudy.basics.shares import sigmas_95
 from accelstudy.study.cell import Cell
 from accelstudy.study.estimate import (
@@ -29,7 +29,6 @@ from accelstudy.study.estimate import (
 from accelstudy.study.known import KnownValues
 from accelstudy.study.replicates import Replicates, simulate
 
-Array = NDArray[np.float64]
 Key = tuple[str, str]
 """Quantity, and the name of what it is of."""
 

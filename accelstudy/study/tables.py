@@ -8,8 +8,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from accelstudy.basics.arrays import Array
 from accelstudy.basics.errors import InputError
 from accelstudy.basics.shares import Z95, sigmas_95, wilson
 from accelstudy.basics.units import GON, MGON, recorded_unit, to_recorded
@@ -29,7 +29,6 @@ if TYPE_CHECKING:
     import pandas as pd
     import pyarrow as pa
 
-Array = NDArray[np.float64]
 
 log = logging.getLogger(__name__)
 

@@ -10,16 +10,14 @@ import warnings
 from collections.abc import Callable, Iterator, Mapping, Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy import stats
 
+from accelstudy.basics.arrays import Array
 from accelstudy.campaign.calibration.fit import fit_campaign, usual_approach
 from accelstudy.campaign.session import Campaign
 from accelstudy.diagnosis.space.frame import SessionFit
 from accelstudy.diagnosis.space.hypotheses import OUTLIER, Hypothesis
 from accelstudy.sensors.sensor import SensorModel
-
-Array = NDArray[np.float64]
 
 LEVEL = 0.05  # level of all tests together, with Bonferroni's correction for the number of shapes
 MOST = 2  # effects that a forward selection adds, as many as a diagnosis names

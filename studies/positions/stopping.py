@@ -23,6 +23,7 @@ from accelstudy.adjustment import Adjustment, Observations, calibrate
 from accelstudy.adjustment.calibration import CalibrationProblem
 from accelstudy.approaches import get_approach
 from accelstudy.basics import units
+from accelstudy.basics.arrays import Array
 from accelstudy.basics.shares import sigmas_95
 from accelstudy.design.estimability import estimability
 from accelstudy.design.information import Information, position_rows
@@ -33,8 +34,6 @@ from accelstudy.sensors.models import NINE, get_model
 from accelstudy.sequential import choice
 from accelstudy.sequential.promise import Promise, bound, known_variance
 from accelstudy.simulation.sessions import Noise
-
-Array = NDArray[np.float64]
 
 MODEL = get_model(NINE)  # of the sensor and of the calibration
 FIXED = get_scheme("mclaren-24")

@@ -9,17 +9,15 @@ from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from accelstudy import __version__
+from accelstudy.basics.arrays import Array
 from accelstudy.campaign.calibration.sensor_calibration import SensorCalibration
 from accelstudy.effects.components import AXES
 from accelstudy.effects.hold_symbols import HoldSymbols
 from accelstudy.pages import render_text
 from accelstudy.symbolic.algebra import sp
 from accelstudy.symbolic.tracing import derivative, symbolic, symbols
-
-Array = NDArray[np.float64]
 
 MAX_STEPS = 25
 """Newton steps after which there is no solution."""

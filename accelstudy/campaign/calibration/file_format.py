@@ -5,18 +5,16 @@ from __future__ import annotations
 from typing import Annotated, Literal, Self
 
 import numpy as np
-from numpy.typing import NDArray
 from pydantic import AfterValidator, Field, model_validator
 
 from accelstudy.basics import bounds
+from accelstudy.basics.arrays import Array
 from accelstudy.basics.bounds import Range
 from accelstudy.campaign.columns import ANY
 from accelstudy.campaign.header import Exclusion, LogLayout, Nominal, PerAxis
 from accelstudy.files.documents import Document, Part
 from accelstudy.files.validation import Gravity, ParameterSigma, ParameterValue, bounds_of
 from accelstudy.sensors.models import compose
-
-Array = NDArray[np.float64]
 
 REDUNDANCY, VARIANCE = Range(0, 10**9), Range(-1e18, 1e18)
 MIN_VARIANCE = 1e-40

@@ -16,6 +16,7 @@ import pyarrow as pa
 from numpy.typing import NDArray
 from pyarrow.csv import WriteOptions, write_csv
 
+from accelstudy.basics.arrays import Array
 from accelstudy.basics.errors import InputError
 from accelstudy.basics.progress import show, track, warn
 from accelstudy.basics.units import attitude_unit, display_unit, to_attitude, to_display
@@ -35,8 +36,6 @@ from accelstudy.files.outputs import whole_file
 from accelstudy.files.tables import write_table
 from accelstudy.leveling.angles import near_pole
 from accelstudy.pages import render_lines
-
-Array = NDArray[np.float64]
 
 TEMPLATE = "campaign/calibration/leveling.txt.j2"
 SATURATED_SHARE = 0.999

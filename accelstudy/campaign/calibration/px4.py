@@ -13,9 +13,9 @@ from __future__ import annotations
 from itertools import product
 
 import numpy as np
-from numpy.typing import NDArray
 
 from accelstudy import __version__
+from accelstudy.basics.arrays import Array
 from accelstudy.basics.errors import InputError
 from accelstudy.basics.levels import MAX_TILT_GON
 from accelstudy.basics.units import GON, MGON
@@ -25,8 +25,6 @@ from accelstudy.leveling.angles import angles_of, wrap_angle
 from accelstudy.leveling.error import cap_forces
 from accelstudy.pages import render_lines
 from accelstudy.positions.points import evenly_spread
-
-Array = NDArray[np.float64]
 
 TEMPLATE = "campaign/calibration/px4.txt.j2"
 ATTITUDES = 60

@@ -10,9 +10,10 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from accelstudy.basics.arguments import path_of
+from accelstudy.basics.arrays import Array
 from accelstudy.basics.errors import InputError, brief
 from accelstudy.campaign.calibration.file_format import CalibrationDocument
 from accelstudy.campaign.columns import COLUMNS
@@ -22,9 +23,6 @@ from accelstudy.effects.hold_conditions import REFERENCE_TEMPERATURE
 from accelstudy.leveling.angles import angles_of, tilt_by_output, tilt_slope
 from accelstudy.sensors.models import compose
 from accelstudy.sensors.sensor import SensorModel
-
-Array = NDArray[np.float64]
-
 
 RANGE_MARGIN = 0.1
 """Part of the width of a range by which a log may leave it without a warning."""

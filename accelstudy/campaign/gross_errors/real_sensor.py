@@ -13,12 +13,11 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
+from accelstudy.basics.arrays import Array
 from accelstudy.basics.units import STANDARD_GRAVITY
 from accelstudy.campaign.session import Campaign
 from accelstudy.leveling.angles import specific_force
 from accelstudy.sensors.plausibility import LARGEST
-
-Array = NDArray[np.float64]
 
 USUAL_SD = 0.3
 """Standard deviation of each parameter of an uncalibrated sensor, as a share of gravity."""

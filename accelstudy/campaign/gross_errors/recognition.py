@@ -14,6 +14,7 @@ from itertools import chain, permutations, product
 
 import numpy as np
 
+from accelstudy.basics.arrays import Array
 from accelstudy.basics.errors import InputError
 from accelstudy.basics.units import ROBOT_UNITS, SENSOR_UNITS, STANDARD_GRAVITY, UNITS
 from accelstudy.basics.wording import short_list
@@ -21,7 +22,6 @@ from accelstudy.campaign.gross_errors.real_sensor import (
     MAX_USABLE_ERROR,
     MIN_POSITION_ERROR,
     MIN_RATIO,
-    Array,
     Correction,
     RealSensor,
     attitude_forces,

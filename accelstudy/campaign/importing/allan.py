@@ -13,7 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-Array = NDArray[np.float64]
+from accelstudy.basics.arrays import Array
 
 MIN_DIFFERENCES = 10
 """Independent differences of neighbouring means that a trusted value needs (it is right to about

@@ -15,8 +15,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import pyarrow as pa
-from numpy.typing import NDArray
 
+from accelstudy.basics.arrays import Array
 from accelstudy.basics.errors import InputError
 from accelstudy.campaign.importing.raw_table import RawTable, choose, unless_damaged
 
@@ -24,7 +24,6 @@ if TYPE_CHECKING:
     from rosbags.highlevel import AnyReader
     from rosbags.interfaces import Connection
 
-Array = NDArray[np.float64]
 
 BAGS = (b"#ROSBAG V2.0", b"\x89MCAP0", b"SQLite format 3\0")
 ULOG = b"ULog\x01\x12\x35"

@@ -15,6 +15,7 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
+from accelstudy.basics.arrays import Array
 from accelstudy.basics.errors import InputError
 from accelstudy.basics.units import STANDARD_GRAVITY
 from accelstudy.basics.wording import plural, short_list
@@ -33,8 +34,6 @@ from accelstudy.campaign.importing.windows import (
     windows_at_rest,
 )
 from accelstudy.leveling.angles import usual_norm
-
-Array = NDArray[np.float64]
 
 MAX_SATURATED_SHARE = 0.05
 """A hold is useless if more than this share of its samples is at the end of the scale."""

@@ -11,8 +11,9 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from accelstudy.basics.arrays import Array
 from accelstudy.basics.units import STANDARD_GRAVITY
 from accelstudy.basics.wording import comma_list
 from accelstudy.campaign.importing.allan import (
@@ -21,8 +22,6 @@ from accelstudy.campaign.importing.allan import (
     accuracy_of_mean,
     pooled_deviation,
 )
-
-Array = NDArray[np.float64]
 
 MAX_NORM_RATIO = 1.5
 """Largest over smallest norm of the means of one sensor in gravity."""

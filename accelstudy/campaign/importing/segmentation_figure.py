@@ -8,14 +8,12 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.ticker import NullLocator
-from numpy.typing import NDArray
 
+from accelstudy.basics.arrays import Array
 from accelstudy.basics.wording import plural
 from accelstudy.campaign.importing.columns import AXES
 from accelstudy.campaign.importing.holds import Holds
 from accelstudy.drawing.style import FULL, INK, new_figure
-
-Array = NDArray[np.float64]
 
 # Okabe & Ito's colours.
 _COLOURS = ("#0072B2", "#D55E00", "#009E73")

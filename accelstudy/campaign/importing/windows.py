@@ -12,13 +12,12 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
+from accelstudy.basics.arrays import Array
 from accelstudy.basics.errors import InputError
 from accelstudy.basics.units import STANDARD_GRAVITY
 from accelstudy.basics.wording import plural
 from accelstudy.campaign.importing.log import GAP_RATIO, Log
 from accelstudy.campaign.importing.noise import step_in
-
-Array = NDArray[np.float64]
 
 MIN_SAMPLES, MAX_SAMPLES = 8, 10**6
 """Samples of a window, at least and at most."""

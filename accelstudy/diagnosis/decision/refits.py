@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from accelstudy.adjustment.calibration import CalibrationProblem
 from accelstudy.adjustment.quality import Solution, solve
+from accelstudy.basics.arrays import Array
 from accelstudy.basics.errors import InputError
 from accelstudy.diagnosis.evidence.candidates import Cause, Singles, reshape
 from accelstudy.diagnosis.rules import RULES
@@ -22,7 +23,6 @@ from accelstudy.sensors.models import composition_name
 from accelstudy.sensors.plausibility import implausible_parameters, impossible_parameters
 from accelstudy.sensors.sensor import SensorModel
 
-Array = NDArray[np.float64]
 Solved = tuple[Sequence[Hypothesis], Solution]
 
 EDGE_SHARE = 0.1

@@ -13,13 +13,11 @@ afterwards, and about zero with g C before.
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.special import ndtr
 
+from accelstudy.basics.arrays import Array
 from accelstudy.diagnosis.evidence.size import SIZES, Evidence
 from accelstudy.diagnosis.space.hypotheses import Hypothesis
-
-Array = NDArray[np.float64]
 
 MIN_PROBABILITY = 1e-300
 """Least probability that is told from none."""

@@ -9,6 +9,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
+from accelstudy.basics.arrays import Array
 from accelstudy.diagnosis.evidence.bounds import within_bounds
 from accelstudy.diagnosis.evidence.size import Evidence, log_mean
 from accelstudy.diagnosis.rules import RULES
@@ -21,8 +22,6 @@ from accelstudy.diagnosis.space.hypotheses import (
     cosines,
 )
 from accelstudy.diagnosis.space.shapes import LearnedShapes
-
-Array = NDArray[np.float64]
 
 UNKNOWN = "unknown"
 """Something of one of the learned shapes, or of the attitude alone, that is none of the effects."""

@@ -16,15 +16,13 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from accelstudy.basics.arrays import Array
 from accelstudy.diagnosis.evidence.candidates import Field
 from accelstudy.diagnosis.evidence.size import Evidence, log_mean
 from accelstudy.diagnosis.rules import RULES
 from accelstudy.diagnosis.space.hypotheses import Spaces
 from accelstudy.diagnosis.space.residuals import Residuals
-
-Array = NDArray[np.float64]
 
 EFFECTS, PRIORS = 0, 1
 """Streams of the random effects and of the rows of priors, apart from that of the noise."""

@@ -15,6 +15,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from accelstudy.adjustment.quality import Solution
+from accelstudy.basics.arrays import Array
 from accelstudy.basics.errors import InputError
 from accelstudy.diagnosis.rules import RULES
 from accelstudy.diagnosis.space.hypotheses import (
@@ -28,8 +29,6 @@ from accelstudy.diagnosis.space.residuals import Residuals, Signature, ideal_res
 from accelstudy.effects import Effect, HoldConditions, effect_names, get_effect
 from accelstudy.leveling.angles import angles_of
 from accelstudy.sensors.models import compose
-
-Array = NDArray[np.float64]
 
 ROUNDING = 1e-9
 """Share of a signature that rounding errors may leave where nothing is left."""

@@ -17,6 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from accelstudy.adjustment.quality import root_of
+from accelstudy.basics.arrays import Array
 from accelstudy.diagnosis.rules import RULES
 from accelstudy.diagnosis.space.residuals import Residuals
 from accelstudy.effects import Effect
@@ -24,7 +25,6 @@ from accelstudy.effects import Effect
 if TYPE_CHECKING:
     from accelstudy.diagnosis.evidence.size import Evidence
 
-Array = NDArray[np.float64]
 
 OUTLIER = "outlier_position"
 

@@ -22,10 +22,9 @@ from accelstudy.adjustment import Observations
 from accelstudy.adjustment.calibration import CalibrationProblem
 from accelstudy.adjustment.quality import Solution, column_basis, diagonal_blocks, whitening_of
 from accelstudy.approaches import Approach
+from accelstudy.basics.arrays import Array
 from accelstudy.leveling.angles import angles_of, specific_force
 from accelstudy.sensors.sensor import SensorModel
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)

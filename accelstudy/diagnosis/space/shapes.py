@@ -19,6 +19,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg import block_diag
 
+from accelstudy.basics.arrays import Array
 from accelstudy.diagnosis.rules import RULES
 from accelstudy.diagnosis.space.frame import HoldColumns, SessionFit
 from accelstudy.diagnosis.space.hypotheses import Shapes, Spaces, log_sum
@@ -37,7 +38,6 @@ from accelstudy.leveling.angles import wrap_angle
 if TYPE_CHECKING:
     from accelstudy.diagnosis.evidence.size import Evidence
 
-Array = NDArray[np.float64]
 
 DIRECTIONS, SPHERE_DIRECTIONS = 12, 60
 """Functions of the direction of gravity for each axis, and directions that they are made of."""

@@ -11,9 +11,9 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import pandas as pd
-from numpy.typing import NDArray
 from scipy import special
 
+from accelstudy.basics.arrays import Array
 from accelstudy.basics.shares import Z95
 from accelstudy.basics.units import GON, MGON
 from accelstudy.effects import get_effect
@@ -25,7 +25,6 @@ from accelstudy.study.config import APPROACHES
 if TYPE_CHECKING:
     from accelstudy.study.claims.verdicts import ClaimData
 
-Array = NDArray[np.float64]
 Numbers = dict[str, Any]
 
 DRAWS = 200_000
