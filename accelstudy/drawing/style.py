@@ -15,6 +15,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from accelstudy.basics.arrays import Array
 from accelstudy.basics.units import display_unit, recorded_unit, to_display, to_si, unit_label
 from accelstudy.effects import Parameter, effect_names, get_effect
 from accelstudy.sensors.models import NINE
@@ -138,7 +139,7 @@ def symbol(parameter: str) -> str:
     return _parameter(parameter)[1].symbol
 
 
-def in_shown_unit(values: ArrayLike, unit: str) -> tuple[NDArray[np.float64], str]:
+def in_shown_unit(values: ArrayLike, unit: str) -> tuple[Array, str]:
     """Convert values in the unit of a table into what people see; the values and their unit."""
     if unit != recorded_unit("rad"):
         return np.asarray(values, dtype=float), unit_label(unit)
@@ -219,7 +220,7 @@ def matrix(
     ax: Axes,
     rows: Sequence[str],
     columns: Sequence[str],
-    values: NDArray[np.float64],
+    values: Array,
     texts: NDArray[np.str_],
     **colours: Any,
 ) -> AxesImage:
@@ -245,7 +246,7 @@ def inks_on(image: AxesImage, values: ArrayLike) -> NDArray[np.str_]:
     """
     from matplotlib.colors import to_rgb
 
-    def luminance(colours: ArrayLike) -> NDArray[np.float64]:
+    def luminance(colours: ArrayLike) -> Array:
         rgb = np.asarray(colours, dtype=float)[..., :3]
         linear = np.where(rgb <= 0.04045, rgb / 12.92, ((rgb + 0.055) / 1.055) ** 2.4)
         return np.asarray(linear @ (0.2126, 0.7152, 0.0722)) + 0.05

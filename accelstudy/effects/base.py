@@ -22,8 +22,8 @@ from itertools import product
 from typing import Any, ClassVar, Literal
 
 import numpy as np
-from numpy.typing import NDArray
 
+from accelstudy.basics.arrays import Array
 from accelstudy.basics.errors import InputError, UnknownNameError
 from accelstudy.basics.registry import RegistryWithSettings, WithSettings
 from accelstudy.basics.units import STANDARD_GRAVITY
@@ -118,7 +118,7 @@ class Effect(WithSettings):
         return ", ".join(t.replace("**2", "²").replace("**3", "³").replace("*", " ") for t in texts)
 
     @property
-    def deviations(self) -> NDArray[np.float64]:
+    def deviations(self) -> Array:
         """Standard deviations of the parameters a priori, (k,), SI; infinite if unknown."""
         return np.full(len(self.parameters), np.inf)
 
@@ -153,9 +153,7 @@ class Effect(WithSettings):
         names = f"[{', '.join(p.name for p in self.parameters)}]" if self.partial else ""
         return super().spec + names
 
-    def candidates(
-        self, hold: HoldConditions, f: NDArray[np.float64], g: float
-    ) -> Sequence[Effect]:
+    def candidates(self, hold: HoldConditions, f: Array, g: float) -> Sequence[Effect]:
         """Shapes of the effect, that is, settings to try, for given holds with forces f (n, 3)."""
         return (self,)
 

@@ -8,6 +8,7 @@ from functools import cache
 import numpy as np
 from numpy.typing import NDArray
 
+from accelstudy.basics.arrays import Array
 from accelstudy.basics.errors import InputError
 from accelstudy.effects.lag import TemperatureCourse
 
@@ -40,16 +41,16 @@ class HoldConditions:
     full_range : float, m/s², the sensor measures ± this
     """
 
-    temperature: NDArray[np.float64] | None = None
-    time: NDArray[np.float64] | None = None
-    vibration: NDArray[np.float64] | None = None
-    roll: NDArray[np.float64] | None = None
-    pitch: NDArray[np.float64] | None = None
-    yaw: NDArray[np.float64] | None = None
-    step_x: NDArray[np.float64] | None = None
-    step_y: NDArray[np.float64] | None = None
-    step_z: NDArray[np.float64] | None = None
-    order: NDArray[np.float64] | None = None
+    temperature: Array | None = None
+    time: Array | None = None
+    vibration: Array | None = None
+    roll: Array | None = None
+    pitch: Array | None = None
+    yaw: Array | None = None
+    step_x: Array | None = None
+    step_y: Array | None = None
+    step_z: Array | None = None
+    order: Array | None = None
     course: TemperatureCourse | None = None
     full_range: float | None = None
 
@@ -62,7 +63,7 @@ class HoldConditions:
             full_range=self.full_range,
         )
 
-    def with_steps(self, forces: NDArray[np.float64]) -> HoldConditions:
+    def with_steps(self, forces: Array) -> HoldConditions:
         """Return the holds, which are in order of acquisition, with columns that follow from it.
 
         These are the steps of forces (n, 3), m/s², and `order` unless it is known.
@@ -80,14 +81,14 @@ class HoldConditions:
         """Names of all columns."""
         return tuple(field.name for field in fields(cls) if field.name not in OF_ALL)
 
-    def column(self, name: str) -> NDArray[np.float64]:
+    def column(self, name: str) -> Array:
         """Return a column, or raise `InputError` if these holds do not have it."""
         values = getattr(self, name)
         if values is None:
             raise InputError(f"the model needs the column {name!r} of each position; it is absent")
         return np.asarray(values, dtype=float)
 
-    def lagged(self, tau: float) -> NDArray[np.float64]:
+    def lagged(self, tau: float) -> Array:
         """Temperature of a body that follows the thermometer with a lag of `tau` s, °C, (n,).
 
         Raises

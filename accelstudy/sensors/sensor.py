@@ -19,6 +19,7 @@ from itertools import islice
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from accelstudy.basics.arrays import Array
 from accelstudy.basics.errors import InputError
 from accelstudy.basics.units import STANDARD_GRAVITY
 from accelstudy.effects import Effect, HoldConditions, Parameter, get_effect
@@ -85,16 +86,16 @@ class SensorModel:
         return np.array([e.part == "sensor" for e in self.effects for _ in e.parameters], bool)
 
     @cached_property
-    def prior_weights(self) -> NDArray[np.float64]:
+    def prior_weights(self) -> Array:
         """Weights (u,) of the parameters, observed as zero a priori; 0 if nothing is known."""
         return np.concatenate([np.zeros(0), *(effect.deviations**-2 for effect in self.effects)])
 
-    def vector(self, values: Mapping[str, float]) -> NDArray[np.float64]:
+    def vector(self, values: Mapping[str, float]) -> Array:
         """Parameter vector (u,) in SI from a mapping; parameters that it does not name are zero."""
         return np.array([values.get(name, 0.0) for name in self.parameter_names], dtype=float)
 
     @cached_property
-    def settings(self) -> NDArray[np.float64]:
+    def settings(self) -> Array:
         """Settings of all effects, (s,), effect after effect."""
         return np.array(
             [v for effect in self.effects for v in effect.settings.values()], dtype=float
@@ -128,9 +129,7 @@ class SensorModel:
         """The model without the effects of the rig, which stay with it."""
         return SensorModel(self.name, tuple(e for e in self.effects if e.part == "sensor"))
 
-    def affine(
-        self, parameters: ArrayLike
-    ) -> tuple[NDArray[np.float64], NDArray[np.float64]] | None:
+    def affine(self, parameters: ArrayLike) -> tuple[Array, Array] | None:
         """K (3, 3) and b (3,) of f_b = K (f_s − b); None if the model is not affine.
 
         Effects of the rig are left out: they are no part of the sensor.
@@ -154,7 +153,7 @@ class SensorModel:
         parameters: ArrayLike,
         g: ArrayLike = STANDARD_GRAVITY,
         hold: HoldConditions | None = None,
-    ) -> NDArray[np.float64]:
+    ) -> Array:
         """Output of the sensor for a specific force in the body frame (forward, no noise).
 
         Parameters
@@ -177,7 +176,7 @@ class SensorModel:
         parameters: ArrayLike,
         g: ArrayLike = STANDARD_GRAVITY,
         hold: HoldConditions | None = None,
-    ) -> NDArray[np.float64]:
+    ) -> Array:
         """Specific force in the body frame for a sensor output: the inverse of `sense`.
 
         Parameters and result as in `sense`, with f_s and f_b exchanged. Where the Newton iteration
@@ -192,7 +191,7 @@ class SensorModel:
         parameters: ArrayLike,
         g: ArrayLike = STANDARD_GRAVITY,
         hold: HoldConditions | None = None,
-    ) -> NDArray[np.float64]:
+    ) -> Array:
         """Derivative of `correct` with respect to the parameters, (..., n, 3, u)."""
         f_a = self.sensitive_force(f_s, parameters, g, hold)
         return self._evaluate(self.trace.body_jacobian, f_a, parameters, g, hold)
@@ -203,7 +202,7 @@ class SensorModel:
         parameters: ArrayLike,
         g: ArrayLike = STANDARD_GRAVITY,
         hold: HoldConditions | None = None,
-    ) -> NDArray[np.float64]:
+    ) -> Array:
         """Derivative of `correct` with respect to the sensor's output, (..., n, 3, 3)."""
         f_a = self.sensitive_force(f_s, parameters, g, hold)
         return self._evaluate(self.trace.output_jacobian, f_a, parameters, g, hold)
@@ -214,7 +213,7 @@ class SensorModel:
         parameters: ArrayLike,
         g: ArrayLike = STANDARD_GRAVITY,
         hold: HoldConditions | None = None,
-    ) -> NDArray[np.float64]:
+    ) -> Array:
         """Specific force in the sensitive axes, f_a, for a sensor output; else as `correct`."""
         step, f_a = np.zeros_like(f_s, dtype=float), np.asarray(f_s, dtype=float)
         with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
@@ -229,7 +228,7 @@ class SensorModel:
         parameters: ArrayLike,
         g: ArrayLike = STANDARD_GRAVITY,
         hold: HoldConditions | None = None,
-    ) -> Iterator[tuple[NDArray[np.float64], NDArray[np.float64]]]:
+    ) -> Iterator[tuple[Array, Array]]:
         """Yield f_a and the step to it, one step of Newton's method after the other, without end.
 
         Parameters as in `correct`.
@@ -243,22 +242,22 @@ class SensorModel:
             yield f_a, step
 
     def slope_of_last(
-        self, f_a: NDArray[np.float64], parameters: ArrayLike, hold: HoldConditions | None
-    ) -> NDArray[np.float64]:
+        self, f_a: Array, parameters: ArrayLike, hold: HoldConditions | None
+    ) -> Array:
         """Derivative of the output, by what the effects before the last ones leave, (..., n, 3, 3).
 
         Parameters (u,) as in `sense`, with the force f_a (..., n, 3) in the sensitive axes.
         """
         return self._evaluate(self.trace.by_last, f_a, parameters, STANDARD_GRAVITY, hold)
 
-    def axes_matrix(self, parameters: ArrayLike) -> NDArray[np.float64]:
+    def axes_matrix(self, parameters: ArrayLike) -> Array:
         """Return T, (3, 3), which turns forces in the sensitive axes into the body frame."""
         body = self._evaluate(self.trace.body, np.eye(3), parameters, STANDARD_GRAVITY, None)
         return body[..., 0].T
 
     def reading_errors(
         self, angles: ArrayLike, parameters: ArrayLike, hold: HoldConditions | None = None
-    ) -> NDArray[np.float64]:
+    ) -> Array:
         """Return what the effects add to a robot's reading of roll and pitch.
 
         Effects are functions of what the robot reads, as in the adjustment, so the reading r of an
@@ -286,10 +285,10 @@ class SensorModel:
 
     def errors_of_reading(
         self,
-        reading: NDArray[np.float64],
+        reading: Array,
         parameters: ArrayLike,
         hold: HoldConditions | None = None,
-    ) -> NDArray[np.float64]:
+    ) -> Array:
         """Return the errors (..., n, 2) of a reading (..., n, 2); see `reading_errors`."""
         padded = np.concatenate([reading, np.zeros_like(reading[..., :1])], axis=-1)
         errors = self._evaluate(self.trace.reading, padded, parameters, STANDARD_GRAVITY, hold)
@@ -303,7 +302,7 @@ class SensorModel:
         g: ArrayLike,
         hold: HoldConditions | None,
         output: ArrayLike | None = None,
-    ) -> NDArray[np.float64]:
+    ) -> Array:
         """Call a function of the trace, components last; returns (..., n, rows, columns)."""
         force = _components(force)
         output = force if output is None else _components(output)
@@ -312,7 +311,7 @@ class SensorModel:
         return result.transpose(*range(2, result.ndim), 0, 1)
 
 
-def _components(vectors: ArrayLike) -> NDArray[np.float64]:
+def _components(vectors: ArrayLike) -> Array:
     """Turn the last axis into the first, as `np.moveaxis` does in many times the time."""
     array = np.asarray(vectors, dtype=float)
     return array.transpose(-1, *range(array.ndim - 1))

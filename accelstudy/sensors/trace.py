@@ -7,8 +7,8 @@ from functools import cache, cached_property
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from accelstudy.basics.arrays import Array
 from accelstudy.effects import Effect, HoldConditions
 from accelstudy.effects.hold_symbols import HoldSymbols
 from accelstudy.symbolic.algebra import sp
@@ -159,21 +159,21 @@ class SensorTrace:
     def _lags(self) -> list[tuple[int, str]]:
         return cached_by_key(self.key, "lags", lambda: self.formulas.lags)
 
-    def lags(self, settings: NDArray[np.float64]) -> list[tuple[float, str]]:
+    def lags(self, settings: Array) -> list[tuple[float, str]]:
         """Lags of temperatures, of settings (s,), with the names of the temperatures."""
         return [(float(settings[number]), name) for number, name in self._lags]
 
     def evaluate(
         self,
         function: TracedFunction,
-        force: NDArray[np.float64],
-        output: NDArray[np.float64],
-        parameters: NDArray[np.float64],
-        settings: NDArray[np.float64],
-        g: NDArray[np.float64],
+        force: Array,
+        output: Array,
+        parameters: Array,
+        settings: Array,
+        g: Array,
         hold: HoldConditions | None,
-        *more: NDArray[np.float64],
-    ) -> NDArray[np.float64]:
+        *more: Array,
+    ) -> Array:
         """Call a generated function, components first.
 
         force, output : (3, ..., n); parameters : (u, ...); settings : (s,); g : (...); more :

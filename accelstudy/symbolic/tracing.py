@@ -14,8 +14,8 @@ from types import CodeType, FunctionType
 from typing import Any, ClassVar, Protocol, TypeAlias
 
 import numpy as np
-from numpy.typing import NDArray
 
+from accelstudy.basics.arrays import Array
 from accelstudy.symbolic.algebra import sp
 from accelstudy.symbolic.formula_cache import cached_by_key, key_of
 
@@ -144,7 +144,7 @@ class TracedFunction:
         """Whether all entries are zero by structure."""
         return not self._generated[1]
 
-    def __call__(self, shape: tuple[int, ...], *arguments: Any) -> NDArray[np.float64]:
+    def __call__(self, shape: tuple[int, ...], *arguments: Any) -> Array:
         """Evaluate at arrays that broadcast to `shape`; returns an array (rows, columns, *shape).
 
         The components come first, so that each is contiguous. Entries that are zero by structure
@@ -178,9 +178,7 @@ def traced(trace: Callable[[Any], Traced]) -> cached_property[TracedFunction]:
     return cached_property(function)
 
 
-def jacobian_of(
-    function: Callable[..., Sequence[Any]], n: int
-) -> Callable[[NDArray[np.float64]], NDArray[np.float64]]:
+def jacobian_of(function: Callable[..., Sequence[Any]], n: int) -> Callable[[Array], Array]:
     """Jacobian of a function ``function(components, xp)`` of `n` components, by tracing.
 
     Returns a function of an array (..., n) with values (..., m, n).
@@ -192,7 +190,7 @@ def jacobian_of(
 
     matrix = TracedFunction(trace, key_of(function, str(n)), "jacobian")
 
-    def evaluate(values: NDArray[np.float64]) -> NDArray[np.float64]:
+    def evaluate(values: Array) -> Array:
         return np.moveaxis(matrix(values.shape[:-1], *np.moveaxis(values, -1, 0)), (0, 1), (-2, -1))
 
     return evaluate

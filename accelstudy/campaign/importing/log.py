@@ -15,6 +15,7 @@ import pyarrow as pa
 from numpy.typing import NDArray
 
 from accelstudy.basics.arguments import path_of
+from accelstudy.basics.arrays import Array
 from accelstudy.basics.errors import InputError
 from accelstudy.basics.units import CLOCK_UNITS, UNITS
 from accelstudy.basics.wording import plural
@@ -33,8 +34,6 @@ from accelstudy.campaign.importing.columns import (
 from accelstudy.campaign.importing.formats import read_table, table_in_memory
 from accelstudy.campaign.importing.raw_table import RawTable
 from accelstudy.sensors.conversion import MAX_VALUE
-
-Array = NDArray[np.float64]
 
 MAX_FORCE = 1e4
 """m/s², some 1000 g: what levels gives no larger reading."""

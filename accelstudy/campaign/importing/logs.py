@@ -8,7 +8,6 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, cast
 
 import numpy as np
-from numpy.typing import NDArray
 
 from accelstudy.basics.arguments import tidy
 from accelstudy.basics.bounds import SIGMA_FORCE
@@ -28,7 +27,6 @@ from accelstudy.campaign.session import Campaign
 if TYPE_CHECKING:
     from accelstudy.campaign.reference_log import ReferenceLog
 
-Array = NDArray[np.float64]
 Imported = tuple[Campaign, Holds | None]
 """A campaign, and the holds that it was made of; None of a table of means."""
 

@@ -8,7 +8,6 @@ from itertools import product
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from accelstudy.adjustment.calibration import CalibrationProblem
 from accelstudy.adjustment.quality import Solution, solve
@@ -120,9 +119,7 @@ STEP = 1e-4
 """Change of the logarithm of a setting for a derivative by it."""
 
 
-def with_settings(
-    frame: SessionFit, fit: Solution, chosen: Sequence[Hypothesis]
-) -> NDArray[np.float64]:
+def with_settings(frame: SessionFit, fit: Solution, chosen: Sequence[Hypothesis]) -> Array:
     """Cofactors of a fit, with those of the settings that were searched for.
 
     The derivatives of the conditions by a setting are a further column of the design, and the

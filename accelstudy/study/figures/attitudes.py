@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from accelstudy.basics.arrays import Array
 from accelstudy.basics.units import GON, attitude_unit, shown_unit, to_attitude, to_display
 from accelstudy.drawing import style
 from accelstudy.leveling.angles import jacobian, sigma_roll_pitch, specific_force
@@ -154,9 +155,7 @@ def effects_of_forces(tables: Tables, study: Study) -> Figure:
     )
 
 
-def linear_shares(
-    roll_gon: NDArray[np.float64], pitch_gon: NDArray[np.float64]
-) -> NDArray[np.float64]:
+def linear_shares(roll_gon: Array, pitch_gon: Array) -> Array:
     """Shares (..., 2, 3) of equally noisy forces in the variance of roll and pitch, linearly."""
     force = np.stack(specific_force(roll_gon * GON, pitch_gon * GON, 1.0), axis=-1)
     squares = jacobian(force) ** 2
