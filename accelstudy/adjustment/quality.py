@@ -109,6 +109,33 @@ class Solution:
         """Variance of unit weight a posteriori σ̂0² = Ω/r; NaN without redundancy."""
         return self.omega / self.redundancy if self.redundancy > 0 else np.nan
 
+    @property
+    def sigma_posteriori(self) -> float:
+        """Noise of a force by the residuals, m/s²; NaN without redundancy."""
+        return self.sigma_force * float(np.sqrt(self.variance_posteriori))
+
+    @property
+    def global_test(self) -> GlobalTest | None:
+        """Test of the whole model against the stated noise; None without redundancy."""
+        return global_test(self.omega, self.redundancy, sigma_dof=self.sigma_dof)
+
+    def judge_noise(self, stated: bool) -> NoiseJudgement:
+        """Judge the noise by the global test, and say which variance of unit weight to quote.
+
+        A stated noise is trusted unless the residuals refute it. If it is itself an estimate it is
+        pooled with the residuals: a variance of 1 with ν degrees of freedom and one of Ω/r with r
+        give (ν + Ω)/(ν + r). If it is not trusted the noise is that of the residuals.
+
+        Parameters
+        ----------
+        stated : bool, whether the noise was stated, and not taken from the residuals
+        """
+        test, dof = self.global_test, self.sigma_dof
+        if not stated or (test is not None and not test.accepted):
+            return NoiseJudgement(False, self.variance_posteriori)
+        pooled = (dof + self.omega) / (dof + self.redundancy) if np.isfinite(dof) else 1.0
+        return NoiseJudgement(True, pooled)
+
     @cached_property
     def whitening(self) -> Array:
         """L of each position, (n, c, c)."""
@@ -315,12 +342,17 @@ def global_test(
     return GlobalTest(float(statistic), redundancy, p_value, p_value >= alpha, sigma_dof)
 
 
-def pooled_variance(omega: float, redundancy: int, sigma_dof: float) -> float:
-    """Variance of unit weight by the stated noise and the residuals together; 1 where it is known.
+class NoiseJudgement(NamedTuple):
+    """A judgement of the noise of a fit.
 
-    A variance of 1 with ν degrees of freedom and one of Ω/r with r give (ν + Ω)/(ν + r) with ν + r.
+    Attributes
+    ----------
+    trusted : bool, whether the noise is stated and nothing refutes it
+    variance : float, variance of unit weight to quote; 1 where the stated noise is known
     """
-    return (sigma_dof + omega) / (sigma_dof + redundancy) if np.isfinite(sigma_dof) else 1.0
+
+    trusted: bool
+    variance: float
 
 
 @dataclass(frozen=True)

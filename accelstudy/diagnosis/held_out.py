@@ -111,8 +111,8 @@ def _confirm(problem: Problem, finding: Finding, gap: Gap, rng: np.random.Genera
     refitted = _refit(part, chosen, place)
     if isinstance(refitted, str):
         return replace(gap, reason=refitted)
-    known = problem.evidence.level.known
-    variance = problem.at(finding.frame).noise_judgement.variance if known else None
+    known, final = problem.evidence.level.known, finding.frame.solution
+    variance = final.judge_noise(known).variance if known else None
     rest = first.observed.take(held)
     test = held_out_gap(base, refitted, rest, held, variance)
     if others:
@@ -122,7 +122,7 @@ def _confirm(problem: Problem, finding: Finding, gap: Gap, rng: np.random.Genera
     gap = replace(gap, held_out=test, confirmed=test.significant)
     alone = finding.verdict == "named" and len(finding.chosen) == 1
     # Of what leaves more than the noise the name may be that of something that is not listed.
-    if not gap.confirmed or not alone or problem.at(finding.frame).exceeds_stated:
+    if not gap.confirmed or not alone or problem.exceeds_stated(final):
         return gap
     (cause,) = finding.chosen
     # What was found, and all that could leave the same in this campaign.

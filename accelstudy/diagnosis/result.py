@@ -12,9 +12,9 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import special
 
-from accelstudy.adjustment.quality import GlobalTest, Solution, global_test, suspects
+from accelstudy.adjustment.quality import NoiseJudgement, Solution
 from accelstudy.basics.progress import stage
-from accelstudy.campaign.calibration.campaign_fit import OUTLIER_LEVEL, NoiseJudgement
+from accelstudy.campaign.calibration.campaign_fit import CampaignFit
 from accelstudy.campaign.gross_errors.recognition import Recognition
 from accelstudy.campaign.session import Campaign
 from accelstudy.diagnosis.decision.functions import LearnedShape, shape_of, shares_of_places
@@ -106,6 +106,18 @@ class CampaignDiagnosis:
     def extended_model(self) -> SensorModel:
         """Model with the effects that were found; the model itself if there are none."""
         return self.final.solution.model
+
+    @cached_property
+    def base_fit(self) -> CampaignFit:
+        """The calibration with the base model."""
+        return CampaignFit(self.campaign, self.base)
+
+    @cached_property
+    def calibrated(self) -> CampaignFit:
+        """The calibration with what was found, without positions that were found to be bumped."""
+        bumped = self.campaign.positions[~self.used_positions].tolist()
+        reasons = dict.fromkeys(bumped, "bumped, as the diagnosis found")
+        return CampaignFit(self.campaign.without(reasons), self.final.solution)
 
     @property
     def invisible(self) -> tuple[str, ...]:
@@ -228,32 +240,20 @@ class CampaignDiagnosis:
         """Whether the campaign states its noise."""
         return self.problem.evidence.level.known
 
-    @cached_property
-    def after(self) -> Problem:
-        """The problem that the final fit poses."""
-        return self.problem.at(self.final)
-
     @property
     def noise(self) -> NoiseJudgement:
         """Whether the residuals of the final fit bear sigma, and the variance that is quoted."""
-        return self.after.noise_judgement
+        return self.final.solution.judge_noise(self.sigma_known)
 
     @cached_property
     def noise_tests(self) -> tuple[NoiseTest, ...]:
         """Tests of the noise on the residuals of the final fit."""
-        return self.after.noise_tests(self.campaign)
+        return self.problem.at(self.final).noise_tests(self.campaign)
 
     @property
-    def sigma_position(self) -> float:
-        """Noise of a position mean, m/s², that the diagnosis assumes."""
-        return float(np.sqrt(self.noise.variance) * np.mean(self.final.residuals.sigmas[:, :3]))
-
-    @property
-    def global_test(self) -> GlobalTest | None:
-        """Test of the base model against the a-priori sigma."""
-        if not self.sigma_known:
-            return None
-        return global_test(self.base.omega, self.base.redundancy, sigma_dof=self.base.sigma_dof)
+    def exceeds_stated(self) -> bool:
+        """Whether the final fit leaves more than the stated noise."""
+        return self.problem.exceeds_stated(self.final.solution)
 
     @property
     def fits(self) -> list[Fit]:
@@ -362,16 +362,10 @@ class CampaignDiagnosis:
     @cached_property
     def suspects(self) -> dict[int, float]:
         """Positions that a calibration with the base model marks, and the p-value of each."""
-        base = self.base
-        if self.problem.exact:
-            return {}
-        trusted = self.problem.noise_judgement.trusted
-        marked = suspects(base.model, base.approach, base.observed, OUTLIER_LEVEL, trusted)
-        return {int(self.campaign.positions[s.position]): s.p_value for s in marked}
+        return {} if self.problem.exact else self.base_fit.suspects
 
     @cached_property
     def implausible(self) -> list[str]:
         """Parameters of the final fit that no sensor has."""
-        final, u = self.final.solution, self.extended_model.n_parameters
-        sigma = np.sqrt(np.diag(final.cofactors)[:u] * self.noise.variance)
-        return implausible_parameters(self.extended_model.effects, final.parameters[:u], sigma)
+        fit = self.calibrated
+        return implausible_parameters(fit.model.effects, fit.parameters, fit.sigma)

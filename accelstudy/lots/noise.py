@@ -71,7 +71,7 @@ class NoisePrior:
 def stated_sigma(fit: BaseFit) -> tuple[str, float]:
     """Return the source of the noise of a campaign by itself, and its sigma, m/s²."""
     if fit.level.known:
-        return STATED, fit.sigma
+        return STATED, fit.solution.sigma_force
     return (NOTHING, 1.0) if fit.within is None else (WITHIN, float(np.sqrt(np.mean(fit.within))))
 
 
@@ -124,7 +124,7 @@ def noises_of_lot(
         # Beside angles the noise of the forces is not in proportion to the residuals, and is
         # searched for: with it the residuals are as large as it says.
         for _ in range(1 + MAX_REFITS):
-            sigmas = np.array([one.sigma_posteriori for one in group.values()])
+            sigmas = np.array([one.solution.sigma_posteriori for one in group.values()])
             ratios = np.maximum(sigmas, LEAST_SIGMA) / [own[i] for i in group]
             redundancies = np.array([one.solution.redundancy for one in group.values()])
             before, odd_share = factor, 0.0 if source == NOTHING else ODD_SHARE

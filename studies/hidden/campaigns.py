@@ -105,7 +105,7 @@ def tried(work: Callable[[], Any], what: str, failed: str = "") -> tuple[Any, st
 
 def outcome(d: CampaignDiagnosis) -> Row:
     """What a diagnosis says."""
-    test, held = d.global_test, d.gap.held_out
+    test, held = d.base_fit.global_test, d.gap.held_out
     fits = (d.base, d.final.solution) if d.verdict == "learned" else ()
     return {
         "verdict": d.verdict,

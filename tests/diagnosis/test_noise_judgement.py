@@ -32,12 +32,12 @@ OTHERS = (AXES, COLOUR, TAILS, STEPS)
 
 def made(tests=(), **p):
     """Tests with p-values; what is not named has 0.5."""
-    return [NoiseTest(name, 1.0, p.get(name, 0.5), (1.5,), name) for name in tests]
+    return [NoiseTest(name, 1.0, p.get(name, 0.5), name) for name in tests]
 
 
 def by_holds(p):
     """The test against the noise within the holds."""
-    return NoiseTest(COLOUR, 1.0, p, (1.5,), "holds", by_holds=True)
+    return NoiseTest(COLOUR, 1.0, p, "holds", by_holds=True)
 
 
 def worst(tests, **p):
@@ -90,10 +90,13 @@ def judged(name, factor=1.5, of_noise=0.5, fit=0.5):
         explanation(LEVEL, np.log(of_noise)),
         explanation("hysteresis", np.log1p(-of_noise)),
     ]
-    test = NoiseTest(name, 1.0, 1e-6, (factor,), "what it says")
-    return judge_noise(
-        SimpleNamespace(frame="fit", posterior=Posterior.of(weighed), lack_of_fit=fit), test
+    test = NoiseTest(name, 1.0, 1e-6, "what it says")
+    residuals = SimpleNamespace(variance=factor)
+    posterior = Posterior.of(weighed)
+    problem = SimpleNamespace(
+        frame="fit", residuals=residuals, posterior=posterior, lack_of_fit=fit
     )
+    return judge_noise(problem, test)
 
 
 @pytest.mark.parametrize(("case", "said", "code"), [
@@ -157,7 +160,7 @@ def test_lack_of_fit_is_the_analysis_of_variance(missed):
 def test_sigma_is_taken_where_it_is_given_and_not_refuted(level, scatter, holds):
     problem = repeated(level, scatter)
     e = problem.base.solution.misclosures[:, 0] / 0.002
-    judged = problem.noise_judgement
+    judged = problem.base.solution.judge_noise(level.known)
     assert judged.trusted == holds
     variance = 1.0 if holds else np.sum(e**2) / 27
     assert judged.variance == pytest.approx(variance, rel=1e-3)

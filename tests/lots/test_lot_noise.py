@@ -24,10 +24,11 @@ def fit(true, k, stated=None, within=None):
     return SimpleNamespace(
         level=Level.of_nothing_stated() if stated is None else Level.of_stated_sigma(),
         within=None if within is None else np.full(3, within**2),
-        sigma=stated or true * ratio,
-        sigma_posteriori=true * ratio,
         solution=SimpleNamespace(
-            redundancy=REDUNDANCY, approach=SimpleNamespace(uses_angles=False)
+            redundancy=REDUNDANCY,
+            approach=SimpleNamespace(uses_angles=False),
+            sigma_force=stated or true * ratio,
+            sigma_posteriori=true * ratio,
         ),
     )
 

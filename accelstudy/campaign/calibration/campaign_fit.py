@@ -17,7 +17,6 @@ from accelstudy.basics.shares import sigmas_95
 from accelstudy.basics.units import GON
 from accelstudy.campaign.gross_errors.recognition import Recognition, recognise
 from accelstudy.campaign.session import Campaign
-from accelstudy.design.estimability import Estimability
 from accelstudy.leveling.angles import tilt_by_output, tilt_slope
 from accelstudy.leveling.error import ATTITUDES, cap_forces, holds_in_use
 from accelstudy.sensors.plausibility import implausible_parameters, implausible_tilt
@@ -63,20 +62,6 @@ class TiltBudget:
         return max(largest, key=largest.__getitem__) if np.isfinite(self.total).all() else ""
 
 
-@dataclass(frozen=True)
-class NoiseJudgement:
-    """A judgement of the noise of a campaign.
-
-    Attributes
-    ----------
-    trusted : bool, whether the campaign states its noise and nothing refutes it
-    variance : float, variance of unit weight to quote; 1 where the stated noise is trusted
-    """
-
-    trusted: bool
-    variance: float
-
-
 @dataclass(frozen=True, eq=False)
 class CampaignFit:
     """A calibrated campaign.
@@ -85,14 +70,12 @@ class CampaignFit:
     ----------
     campaign : Campaign
     solution : Solution, of the adjustment
-    estimability : Estimability, of the campaign's own positions
-    judgement : NoiseJudgement, of a diagnosis; by default the global test of this fit judges
+    judgement : NoiseJudgement, of another fit; by default the global test of this fit judges
     """
 
     campaign: Campaign
     solution: quality.Solution
-    estimability: Estimability
-    judgement: NoiseJudgement | None = None
+    judgement: quality.NoiseJudgement | None = None
 
     @property
     def model(self) -> SensorModel:
@@ -112,25 +95,13 @@ class CampaignFit:
     @property
     def global_test(self) -> quality.GlobalTest | None:
         """Test of the whole model; None where sigma is unknown or there is no redundancy."""
-        if self.campaign.sigma_force is None:
-            return None
-        omega, r = self.solution.omega, self.solution.redundancy
-        return quality.global_test(omega, r, sigma_dof=self.solution.sigma_dof)
+        return None if self.campaign.sigma_force is None else self.solution.global_test
 
     @cached_property
-    def noise(self) -> NoiseJudgement:
-        """The noise that is quoted, as a diagnosis or the global test judged it.
-
-        A stated noise is trusted unless the residuals refute it. If it is itself an estimate it is
-        pooled with the residuals; if it is not trusted the noise is that of the residuals.
-        """
-        if self.judgement is not None:
-            return self.judgement
-        test, stated = self.global_test, self.campaign.sigma_force is not None
-        if stated and (test is None or test.accepted):
-            omega, r = self.solution.omega, self.solution.redundancy
-            return NoiseJudgement(True, quality.pooled_variance(omega, r, self.solution.sigma_dof))
-        return NoiseJudgement(False, self.solution.variance_posteriori)
+    def noise(self) -> quality.NoiseJudgement:
+        """The noise that is quoted: that of another fit, or as the global test judges it."""
+        stated = self.campaign.sigma_force is not None
+        return self.judgement or self.solution.judge_noise(stated)
 
     @property
     def dof(self) -> float:
@@ -151,7 +122,7 @@ class CampaignFit:
     @property
     def sigma_position_posteriori(self) -> float:
         """Noise of a position mean from the residuals, m/s²; NaN without redundancy."""
-        return self.solution.sigma_force * float(np.sqrt(self.solution.variance_posteriori))
+        return self.solution.sigma_posteriori
 
     @property
     def covariance(self) -> Array:

@@ -11,6 +11,7 @@ from accelstudy.basics.levels import MAX_TILT_GON
 from accelstudy.basics.units import MGON, recorded_unit, to_recorded
 from accelstudy.campaign.calibration.campaign_fit import CampaignFit
 from accelstudy.campaign.calibration.file_format import CalibrationDocument
+from accelstudy.campaign.calibration.fit import campaign_estimability
 from accelstudy.campaign.calibration.sensor_calibration import ranged_values
 from accelstudy.campaign.calibration.wording import sentences
 from accelstudy.sensors.frames import FRD
@@ -66,7 +67,7 @@ def calibration_document(fit: CampaignFit) -> dict[str, Any]:
         ],
         "covariance": covariance,
         "correlation": covariance / np.outer(sigma, sigma),
-        "condition": fit.estimability.condition,
+        "condition": campaign_estimability(campaign, fit.model, fit.approach).condition,
         "redundancy": solution.redundancy,
         "variance_of_unit_weight": solution.variance_posteriori,
         "iterations": solution.iterations,

@@ -145,7 +145,7 @@ def fit_campaign(
     if not adjustment.converged[0]:
         _determined(campaign, model, approach, sigma_to_show_above(campaign))
         raise InputError(f"{campaign.name}: {_cause(campaign, model, theory)}")
-    fit = CampaignFit(campaign, solve(model, approach, observed, adjustment), theory)
+    fit = CampaignFit(campaign, solve(model, approach, observed, adjustment))
     # Angles, and what is known a priori, need a sigma of the forces beside theirs.
     for _ in range(3 if campaign.sigma_force is None and fit.solution.redundancy > 0 else 0):
         sigma = max(fit.sigma_position_posteriori, 1e-9, least_sigma(campaign, approach))

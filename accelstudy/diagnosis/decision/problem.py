@@ -14,11 +14,10 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import special
 
-from accelstudy.adjustment.quality import Solution, pooled_variance, solve
+from accelstudy.adjustment.quality import Solution, solve
 from accelstudy.approaches import Approach
 from accelstudy.basics.errors import InputError
 from accelstudy.basics.levels import REFUTATION_LEVEL
-from accelstudy.campaign.calibration.campaign_fit import NoiseJudgement
 from accelstudy.campaign.calibration.fit import fit_campaign, least_sigma
 from accelstudy.campaign.session import Campaign
 from accelstudy.diagnosis.decision.posterior import NOT_LISTED, Explanation, Posterior
@@ -68,16 +67,6 @@ class BaseFit:
     solution: Solution
     level: Level
     within: Array | None
-
-    @property
-    def sigma(self) -> float:
-        """Sigma of the forces that the fit took, m/s²."""
-        return self.solution.sigma_force
-
-    @property
-    def sigma_posteriori(self) -> float:
-        """Sigma of the forces by the residuals, m/s²."""
-        return self.sigma * float(np.sqrt(self.solution.variance_posteriori))
 
 
 def fit_base(campaign: Campaign, model: SensorModel, approach: Approach) -> BaseFit:
@@ -211,9 +200,9 @@ class Problem:
         called = {name: one.name for one in classes for name in one.members}
         strength = self.singles.densities
         for (shapes, _), log in zip(sets, logs, strict=True):
-            best = sorted(shapes, key=lambda h: -strength[h.name])
+            best = sorted(shapes, key=lambda h: -strength[h.name]) if log >= least else []
             effects = [members[h.name] for h in best if h.place is None]
-            if log >= least and len(set(effects)) == len(effects):
+            if best and len(set(effects)) == len(effects):
                 named = (Cause(called.get(h.name, h.name), members[h.name], h) for h in best)
                 weighed.append(Explanation(tuple(named), log))
         return weighed
@@ -285,40 +274,25 @@ class Problem:
         """All tests of the noise that a campaign allows."""
         if self.exact:
             return ()
-        residuals, base = self.residuals, self.base
-        tests = [self._level_test] if base.level.known else []
+        residuals, fit, test = self.residuals, self.base.solution, self.frame.solution.global_test
+        tests = [noise.level_test(test)] if self.base.level.known and test is not None else []
         axes, colour = self.noise_evidence
         tests += [
             noise.axis_test(residuals, axes),
             noise.colour_test(residuals, colour),
             noise.tail_test(residuals, self.chance),
             # With a sigma far too large, the attitudes would look like steps.
-            noise.resolution_test(campaign.forces, min(base.sigma, base.sigma_posteriori)),
+            noise.resolution_test(campaign.forces, min(fit.sigma_force, fit.sigma_posteriori)),
         ]
         if campaign.sd is not None and campaign.n_samples is not None:
             sigma = float(np.mean(residuals.sigmas[:, :3]))
             tests.append(noise.within_hold_test(residuals, sigma, campaign.sd, campaign.n_samples))
         return tuple(tests)
 
-    @property
-    def _level_test(self) -> NoiseTest:
-        """Test of the size of the residuals."""
-        return noise.level_test(self.residuals, self.frame.solution.sigma_dof)
-
-    @cached_property
-    def noise_judgement(self) -> NoiseJudgement:
-        """What the residuals say of the noise, which they give where no stated sigma holds."""
-        r, variance = self.residuals.redundancy, self.residuals.variance
-        if not self.base.level.known or self._level_test.p_value < REFUTATION_LEVEL:
-            return NoiseJudgement(trusted=False, variance=variance)
-        pooled = pooled_variance(r * variance, r, self.frame.solution.sigma_dof)
-        return NoiseJudgement(trusted=True, variance=pooled)
-
-    @property
-    def exceeds_stated(self) -> bool:
-        """Whether sigma is given, and the residuals are larger than it allows."""
-        refuted = self.base.level.known and not self.noise_judgement.trusted
-        return refuted and self.residuals.variance > 1
+    def exceeds_stated(self, fit: Solution) -> bool:
+        """Whether sigma is given, and the residuals of a fit are larger than it allows."""
+        trusted, variance = fit.judge_noise(self.base.level.known)
+        return self.base.level.known and not trusted and variance > 1
 
     @property
     def lack_of_fit(self) -> float:

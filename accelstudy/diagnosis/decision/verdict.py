@@ -7,7 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from accelstudy.adjustment.quality import Solution, global_test
+from accelstudy.adjustment.quality import Solution
 from accelstudy.basics.levels import REFUTATION_LEVEL
 from accelstudy.campaign.session import Campaign
 from accelstudy.diagnosis.decision.functions import learn_function
@@ -116,8 +116,7 @@ def dismiss_weak_evidence(problem: Problem, finding: Finding) -> Finding | None:
     """
     if not problem.evidence.level.known or problem.detection.p_value < REFUTATION_LEVEL:
         return None
-    base = problem.base.solution
-    test = global_test(base.omega, base.redundancy, sigma_dof=base.sigma_dof)
+    test = problem.base.solution.global_test
     if test is None or not test.accepted or test.powerless:
         return None
     if any(part.is_effect for part in finding.statement.certain):
@@ -263,7 +262,7 @@ def judge_noise(problem: Problem, worst: NoiseTest) -> Finding:
     if problem.lack_of_fit < REFUTATION_LEVEL and name != STEPS:
         verdict, reason = "unknown", Reason.of("lack of fit")
     # Larger residuals may be an effect that the test for a pattern could not see.
-    elif name == LEVEL and worst.values[0] >= 1 and noise < RULES.more_probable:
+    elif name == LEVEL and problem.residuals.variance >= 1 and noise < RULES.more_probable:
         other = next(n for e in posterior.reported for n in e.names if n not in NOISES)
         reason = Reason.of("noise or effect", name=name, remark=worst.remark, p=noise, other=other)
         verdict = "unknown"

@@ -29,7 +29,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import special
 
-from accelstudy.adjustment.quality import global_test
+from accelstudy.adjustment.quality import GlobalTest
 from accelstudy.basics.levels import REFUTATION_LEVEL
 from accelstudy.diagnosis.evidence.detection import Chance
 from accelstudy.diagnosis.evidence.size import Evidence, log_mean
@@ -61,8 +61,6 @@ class NoiseTest:
     name : str, the noise effect that it looks for
     statistic : float
     p_value : float
-    values : tuple of float, what the data say of it: variance factor, shares of the
-        axes, correlation of successive holds, kurtosis, resolution in m/s²
     remark : str
     by_holds : bool, whether it is measured by the noise within the holds
     """
@@ -70,7 +68,6 @@ class NoiseTest:
     name: str
     statistic: float
     p_value: float
-    values: tuple[float, ...]
     remark: str
     by_holds: bool = False
 
@@ -81,14 +78,12 @@ def force_residuals(residuals: Residuals) -> Array:
     return np.einsum("nc,nca->na", residuals.z[: n * c].reshape(n, c), residuals.force_noise)
 
 
-def level_test(residuals: Residuals, sigma_dof: float = np.inf) -> NoiseTest:
-    """Whether the residuals are as large as sigma says, two-sided (the global test)."""
-    factor = residuals.variance
-    test = global_test(factor * residuals.redundancy, residuals.redundancy, sigma_dof=sigma_dof)
-    assert test is not None
+def level_test(test: GlobalTest) -> NoiseTest:
+    """Whether the residuals are as large as sigma says, two-sided, by the global test."""
+    factor = test.statistic / test.dof
     times, size = np.sqrt(max(factor, 1 / factor)), "larger" if factor > 1 else "smaller"
     remark = f"the residuals are {times:.3g} times {size} than sigma says"
-    return NoiseTest(LEVEL, test.statistic, min(test.p_value, 1.0), (factor,), remark)
+    return NoiseTest(LEVEL, test.statistic, min(test.p_value, 1.0), remark)
 
 
 def axis_test(residuals: Residuals, evidence: float) -> NoiseTest:
@@ -96,7 +91,7 @@ def axis_test(residuals: Residuals, evidence: float) -> NoiseTest:
     squares = np.sum(force_residuals(residuals) ** 2, axis=0)
     shares = tuple((squares / squares.sum()).tolist())
     remark = "shares of x, y and z in the residuals " + ", ".join(f"{k:.2f}" for k in shares)
-    return NoiseTest(AXES, evidence, _bound(evidence), shares, remark)
+    return NoiseTest(AXES, evidence, _bound(evidence), remark)
 
 
 def colour_test(residuals: Residuals, evidence: float) -> NoiseTest:
@@ -104,7 +99,7 @@ def colour_test(residuals: Residuals, evidence: float) -> NoiseTest:
     v = force_residuals(residuals)
     successive = float(np.sum(v[1:] * v[:-1]) / np.sum(v**2))
     remark = f"residuals of successive holds are correlated by {successive:.2f}".replace("-", "−")
-    return NoiseTest(COLOUR, evidence, _bound(evidence), (successive,), remark)
+    return NoiseTest(COLOUR, evidence, _bound(evidence), remark)
 
 
 def _bound(evidence: float) -> float:
@@ -124,7 +119,7 @@ def tail_test(residuals: Residuals, chance: Chance) -> NoiseTest:
     value = float(kurtosis(residuals.z))
     usual = kurtosis(chance.errors(residuals))
     p = float((1 + np.count_nonzero(usual >= value)) / (1 + len(usual)))
-    return NoiseTest(TAILS, value, p, (value,), f"kurtosis of the residuals {value:.1f}")
+    return NoiseTest(TAILS, value, p, f"kurtosis of the residuals {value:.1f}")
 
 
 def within_hold_test(
@@ -145,8 +140,7 @@ def within_hold_test(
     sd, n_samples = sd[several], n_samples[several]
     scatter = residuals.variance * unit**2
     if not sd.any():
-        remark = "the holds say nothing of the noise within them"
-        return NoiseTest(COLOUR, 0.0, 1.0, (0.0,), remark)
+        return NoiseTest(COLOUR, 0.0, 1.0, "the holds say nothing of the noise within them")
     white = float(np.mean(sd**2 / n_samples[:, None]))
     freedom = 3 * float(np.sum(n_samples - 1))
     ratio, sigma = scatter / white, float(np.sqrt(white))
@@ -155,7 +149,7 @@ def within_hold_test(
         f"white noise within the holds explains {1e3 * sigma:.2f} of "
         f"{1e3 * np.sqrt(scatter):.2f} mm/s² of a position mean"
     )
-    return NoiseTest(COLOUR, ratio, p, (sigma,), remark, by_holds=True)
+    return NoiseTest(COLOUR, ratio, p, remark, by_holds=True)
 
 
 def most_evidence(p: float) -> float:
@@ -199,7 +193,7 @@ def resolution_test(forces: Array, sigma: float) -> NoiseTest:
             best, where = float(power[k]), _step(column, frequencies[max(k - 1, 0) : k + 2])
     p = -np.expm1(3 * steps * np.log1p(-np.exp(-min(n * best, 700.0)))) if best else 1.0
     remark = f"readings in steps of {1e3 * where:.2f} mm/s²" if best else "no steps in the readings"
-    return NoiseTest(STEPS, n * best, float(min(p, 1.0)), (where,), remark)
+    return NoiseTest(STEPS, n * best, float(min(p, 1.0)), remark)
 
 
 def _rayleigh(values: Array, frequencies: Array) -> Array:

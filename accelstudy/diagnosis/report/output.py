@@ -19,10 +19,8 @@ from accelstudy.basics.errors import InputError
 from accelstudy.basics.names import MAX_NAME_BYTES
 from accelstudy.basics.progress import say, show, stage, warn
 from accelstudy.basics.units import GON, MGON
-from accelstudy.campaign.calibration.campaign_fit import CampaignFit
 from accelstudy.campaign.calibration.document import calibration_document
 from accelstudy.campaign.calibration.file_format import CalibrationDocument
-from accelstudy.campaign.calibration.fit import campaign_estimability
 from accelstudy.campaign.calibration.result import Calibration
 from accelstudy.campaign.calibration.sensor_calibration import unknown_to_devices
 from accelstudy.diagnosis.decision.statement import Part
@@ -100,7 +98,7 @@ class Diagnosis(Result):
         """The calibration with what was found; why there is none if it cannot be assessed."""
         recognised = self.result.recognised
         try:
-            fit = self._fit()
+            fit = self.result.calibrated
             content = calibration_document(fit)
         except (InputError, LinAlgError) as error:
             return str(error)
@@ -114,28 +112,12 @@ class Diagnosis(Result):
         warnings = [*fit.campaign.warnings, *words.render("warnings", self.result)]
         return Calibration(fit, {**content, "warnings": warnings})
 
-    def _fit(self) -> CampaignFit:
-        """Return the final fit as that of a calibration.
-
-        It is that of the extended model, without positions that were found to be bumped, of data in
-        which a recognised gross error is mended, and with the noise that the diagnosis takes.
-        """
-        d = self.result
-        bumped = d.campaign.positions[~d.used_positions].tolist()
-        campaign = d.campaign.without(dict.fromkeys(bumped, "bumped, as the diagnosis found"))
-        return CampaignFit(
-            campaign=campaign,
-            solution=d.final.solution,
-            estimability=campaign_estimability(campaign, d.extended_model, d.base.approach),
-            judgement=d.noise,
-        )
-
     # --- the files ----------------------------------------------------------------------------
 
     @cached_property
     def content(self) -> dict[str, Any]:
         """Content of diagnosis.json; in SI but for keys that name another unit."""
-        d, test, calibration = self.result, self.result.global_test, self._calibration
+        d, test, calibration = self.result, self.result.base_fit.global_test, self._calibration
         file: dict[str, Any] = {"file": None, "reason": calibration}
         if isinstance(calibration, Calibration):
             file = {"file": "calibration.json", "mended": calibration.content["mended"]}
@@ -154,7 +136,7 @@ class Diagnosis(Result):
                 "sigma": "known" if d.sigma_known else "unknown",
             },
             "noise": {
-                "sigma_mps2": d.sigma_position,
+                "sigma_mps2": d.calibrated.sigma_position,
                 "sigma_source": "a-priori" if d.noise.trusted else "residuals",
                 "tests": d.noise_tests,
             },
