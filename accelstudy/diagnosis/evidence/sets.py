@@ -20,6 +20,7 @@ Stat. Soc. B 82, 1273), costs far less and finds less where signatures are corre
 from __future__ import annotations
 
 from collections.abc import Mapping
+from functools import cache
 from typing import TypeAlias
 
 import numpy as np
@@ -42,6 +43,7 @@ EffectSet: TypeAlias = tuple[tuple[Hypothesis, ...], float]
 """Candidates in their best shapes, and the log density of the residuals with all of them."""
 
 
+@cache
 def set_prior(size: int, count: int) -> float:
     """Log of the prior weight of each set of `size` of `count` classes of candidates.
 
@@ -90,7 +92,6 @@ class _Search:
         self.z, self.evidence = residuals.z, evidence
         self.square = float(self.z @ self.z)
         field, count = Field(candidates), len(candidates)
-        self.priors = {size: set_prior(size, count) for size in range(1, RULES.set_members + 1)}
         self.shapes, spaces = field.shapes, field.spaces
         self.factors = np.array([within_bounds(one, self.z, evidence) for one in self.shapes])
         self.shape_priors = np.log(spaces.prior * count) + self.factors
@@ -122,7 +123,7 @@ class _Search:
                 first = int(self.firsts[k])
                 best = first + int(np.argmax(logs[first : first + self.counts[k]]))
                 self.found[more] = log, (*chosen, best)
-                self.weights[more] = log + self.priors[len(more)]
+                self.weights[more] = log + set_prior(len(more), len(self.counts))
 
     def next(self) -> Places | None:
         """Strongest set that was not extended yet, or such a set without one of its members."""

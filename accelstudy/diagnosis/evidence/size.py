@@ -162,32 +162,36 @@ class Evidence:
         (b, s) array
         """
         count = SIMULATED_SIZES if len(total) > 1 else len(SHAPE_SIZES)
-        each = zip(squares, shares, strict=True)
-        logs = [self.densities_by_size(*one, total, SHAPE_SIZES[:count]) for one in each]
-        weighted = np.stack(logs, axis=1) + np.log(SHAPE_WEIGHTS[:count])
-        return np.asarray(np.logaddexp.reduce(weighted, axis=-1))
+        ranks, logs = np.array([*map(len, shares)]), np.empty((len(total), len(shares), count))
+        for rank in np.unique(ranks):
+            alike = np.flatnonzero(ranks == rank)
+            of = (np.stack([each[i] for i in alike]) for each in (squares, shares))
+            by_shape = self.densities_by_size(*of, total, SHAPE_SIZES[:count])
+            logs[:, alike] = np.swapaxes(by_shape, 0, 1)
+        return np.asarray(np.logaddexp.reduce(logs + np.log(SHAPE_WEIGHTS[:count]), axis=-1))
 
     def densities_by_size(self, along: Array, share: Array, total: Array, sizes: Array) -> Array:
         """Something with a covariance λ K beside the noise, by its size λ, over all levels.
 
         Parameters
         ----------
-        along : (b, k) array, squares of residuals along the eigenvectors of K
-        share : (k,) array, its eigenvalues
+        along : (..., b, k) array, squares of residuals along the eigenvectors of K
+        share : (..., k) array, its eigenvalues
         total : (b,) array, ‖z‖²
         sizes : (s,) array, λ
 
         Returns
         -------
-        (b, s) array
+        (..., b, s) array
         """
-        growth = sizes[:, None] * share
-        taken = along @ (growth / (1 + growth)).T
+        growth = sizes[:, None] * share[..., None, :]
+        taken = along @ np.swapaxes(growth / (1 + growth), -1, -2)
         noise, logs = self.noise_density(total), []
         for level, nu in enumerate(self.level.freedoms):
             rest = np.log1p(-taken / (nu + total)[:, None])
             logs.append(noise[:, level, None] - (nu + self.redundancy) / 2 * rest)
-        return np.asarray(np.logaddexp.reduce(logs) - np.sum(np.log1p(growth), axis=1) / 2)
+        determinant = np.sum(np.log1p(growth), axis=-1)[..., None, :]
+        return np.asarray(np.logaddexp.reduce(logs) - determinant / 2)
 
 
 def _looked_up(tables: Array, which: NDArray[np.int_], at: Array) -> Array:
