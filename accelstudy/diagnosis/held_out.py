@@ -40,25 +40,25 @@ Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)
-class Gap:
-    """How far the disagreement shrinks; None where it does not apply.
+class Confirmation:
+    """What held-out positions confirm of a finding.
 
     Attributes
     ----------
-    before, after : float, variance of unit weight of the base fit and of the final one
-    held_out : HeldOutGap, on positions that were used neither for choosing nor for fitting
-    confirmed : bool, whether it is confirmed that such an effect is missing
-    reason : str, why nothing is confirmed; empty if it is, or if the test did not
+    test : HeldOutTest or None, on positions that were used neither for choosing nor for fitting
+    reason : str, why nothing is confirmed, whatever the test says; empty if the test decides
     names : tuple of str, of which one is confirmed against all others: what was found, with all
         that could leave the same; empty if that is open
     """
 
-    before: float
-    after: float | None = None
-    held_out: HeldOutGap | None = None
-    confirmed: bool = False
+    test: HeldOutTest | None = None
     reason: str = ""
     names: tuple[str, ...] = ()
+
+    @property
+    def confirmed(self) -> bool:
+        """Whether it is confirmed that such an effect is missing."""
+        return self.test is not None and self.test.significant and not self.reason
 
     @property
     def statement(self) -> str | None:
@@ -68,8 +68,8 @@ class Gap:
         return "name" if len(self.names) == 1 else "effect"
 
 
-def gap_of(problem: Problem, finding: Finding, seed: np.random.SeedSequence) -> Gap:
-    """Compare the models on the positions to which they were fitted, and on held-out ones.
+def confirm(problem: Problem, finding: Finding, seed: np.random.SeedSequence) -> Confirmation:
+    """Compare the base model and the final one on held-out positions, if effects were chosen.
 
     Parameters
     ----------
@@ -77,18 +77,13 @@ def gap_of(problem: Problem, finding: Finding, seed: np.random.SeedSequence) -> 
     finding : Finding
     seed : SeedSequence, of the split
     """
-    base, final = problem.base.solution, finding.frame.solution
-    before = base.omega / base.redundancy
-    if not finding.chosen:
-        return Gap(before)
-    gap = Gap(before, final.omega / final.redundancy * relative_variance(final, base))
-    if finding.verdict == "gross_error":
-        return gap
+    if not finding.chosen or finding.verdict == "gross_error":
+        return Confirmation()
     with stage("held-out positions"):
-        return _confirm(problem, finding, gap, np.random.default_rng(seed))
+        return _confirm(problem, finding, np.random.default_rng(seed))
 
 
-def _confirm(problem: Problem, finding: Finding, gap: Gap, rng: np.random.Generator) -> Gap:
+def _confirm(problem: Problem, finding: Finding, rng: np.random.Generator) -> Confirmation:
     """Choose and fit on a part of the positions, and predict the rest."""
     first, place = problem.base.solution, finding.place
     n, c = len(first.misclosures), first.approach.n_conditions
@@ -100,30 +95,28 @@ def _confirm(problem: Problem, finding: Finding, gap: Gap, rng: np.random.Genera
             f"no held-out positions: choosing and fitting needs {needed} positions and at least "
             f"{fewest} are to be predicted, {needed + fewest} in all; there are {n}"
         )
-        return replace(gap, reason=reason)
+        return Confirmation(reason=reason)
     fitted, held = split_positions(problem.frame.forces, problem.frame.hold, count, rng)
     try:
         base = solve(first.model, first.approach, first.observed.take(fitted))
     except (InputError, np.linalg.LinAlgError):
-        return replace(gap, reason="the fitted positions do not determine the model")
+        return Confirmation(reason="the fitted positions do not determine the model")
     part = pose(replace(problem.base, solution=base))
     chosen, others = _chosen_alike(part, finding)
     refitted = _refit(part, chosen, place)
     if isinstance(refitted, str):
-        return replace(gap, reason=refitted)
+        return Confirmation(reason=refitted)
     known, final = problem.evidence.level.known, finding.frame.solution
     variance = final.judge_noise(known).variance if known else None
     rest = first.observed.take(held)
-    test = held_out_gap(base, refitted, rest, held, variance)
+    test = held_out_test(base, refitted, rest, held, variance)
     if others:
         another = "effect" if place is None else "coordinate or target"
-        reason = f"the fitted positions alone would have chosen another {another}"
-        return replace(gap, held_out=test, reason=reason)
-    gap = replace(gap, held_out=test, confirmed=test.significant)
+        return Confirmation(test, f"the fitted positions alone would have chosen another {another}")
     alone = finding.verdict == "named" and len(finding.chosen) == 1
     # Of what leaves more than the noise the name may be that of something that is not listed.
-    if not gap.confirmed or not alone or problem.exceeds_stated(final):
-        return gap
+    if not test.significant or not alone or problem.exceeds_stated(final):
+        return Confirmation(test)
     (cause,) = finding.chosen
     # What was found, and all that could leave the same in this campaign.
     imitators = problem.frame.imitators(cause.shape)
@@ -134,18 +127,16 @@ def _confirm(problem: Problem, finding: Finding, gap: Gap, rng: np.random.Genera
         fit = refit(part.frame.solution, [best])
         if fit is None:
             return -np.inf
-        return -held_out_gap(base, fit, rest, held, variance).after * held.size * c / 2
+        return -held_out_test(base, fit, rest, held, variance).after * held.size * c / 2
 
     rivals = [
         (one.names[0], part.singles.best[one.names[0]])
         for one in finding.posterior.reported[: RULES.held_out_rivals + 1]
         if len(one.best) == 1 and one.best[0].place is None and one.names[0] in part.singles.best
     ]
-    if not rivals:
-        return gap
-    shares = softmax([log_density(best) for _, best in rivals])
+    shares = softmax([log_density(best) for _, best in rivals]) if rivals else ()
     sure = sum(share for (name, _), share in zip(rivals, shares, strict=True) if name in names)
-    return replace(gap, names=names) if sure >= RULES.sure else gap
+    return Confirmation(test, names=names if sure >= RULES.sure else ())
 
 
 def _chosen_alike(part: Problem, finding: Finding) -> tuple[Sequence[Cause], bool]:
@@ -209,7 +200,7 @@ def _place_of(part: Problem) -> Place | None:
 
 
 @dataclass(frozen=True)
-class HeldOutGap:
+class HeldOutTest:
     """Evidence from held-out positions, in units of the noise variance.
 
     Attributes
@@ -267,13 +258,13 @@ def split_positions(
     return np.sort(best[count:]), np.sort(best[:count])
 
 
-def held_out_gap(
+def held_out_test(
     base: Solution,
     extended: Solution,
     rest: Observations,
     held: NDArray[np.int_],
     variance: float | None,
-) -> HeldOutGap:
+) -> HeldOutTest:
     """Predict positions by fits of two models to others.
 
     Parameters
@@ -291,7 +282,7 @@ def held_out_gap(
     size = float(d @ d + slope @ base.cofactors @ slope)
     cofactors = extended.cofactors / relative_variance(extended, base)
     spread = float(np.einsum("mu,uv,mv->", extended_slopes, cofactors, extended_slopes))
-    return HeldOutGap(
+    return HeldOutTest(
         before=float(np.mean(white**2)) / variance,
         after=float(np.mean(left**2)) / variance,
         floor=1 + spread / len(d),

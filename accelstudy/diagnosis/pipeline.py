@@ -7,7 +7,7 @@
    for sets of up to three effects, the posterior.
 3. The evidence is judged by rules, of which the first that matches decides (`decide`).
 4. The effect is chosen and fitted again on a part of the positions, and the others confirm it, or
-   do not (`gap_of`).
+   do not (`confirm`).
 
 Where the disagreement lives, what it is worth, and where to measure next, a `CampaignDiagnosis`
 computes when it is asked.
@@ -23,7 +23,7 @@ from accelstudy.campaign.gross_errors.recognition import recognise
 from accelstudy.campaign.session import Campaign
 from accelstudy.diagnosis.decision.problem import fit_base, pose
 from accelstudy.diagnosis.decision.verdict import decide
-from accelstudy.diagnosis.held_out import gap_of
+from accelstudy.diagnosis.held_out import confirm
 from accelstudy.diagnosis.result import CampaignDiagnosis
 from accelstudy.sensors.sensor import SensorModel
 
@@ -56,5 +56,5 @@ def diagnose(
     null, split = (np.random.SeedSequence(seed, spawn_key=(key,)) for key in (0, 1))
     problem = pose(fit_base(campaign, model, approach), null)
     finding = decide(problem, campaign)
-    gap = gap_of(problem, finding, split)
-    return CampaignDiagnosis(problem, campaign, finding, gap, recognised)
+    confirmation = confirm(problem, finding, split)
+    return CampaignDiagnosis(problem, campaign, finding, confirmation, recognised)

@@ -21,7 +21,7 @@ from accelstudy.diagnosis.decision.functions import LearnedShape, shape_of, shar
 from accelstudy.diagnosis.decision.posterior import Explanation
 from accelstudy.diagnosis.decision.problem import Problem
 from accelstudy.diagnosis.decision.refits import with_settings
-from accelstudy.diagnosis.decision.statement import Finding, Part, Reason
+from accelstudy.diagnosis.decision.statement import Finding, Reason
 from accelstudy.diagnosis.decision.verdict import p_coloured, reason_of_unrecorded
 from accelstudy.diagnosis.evidence.candidates import UNKNOWN
 from accelstudy.diagnosis.evidence.noise import LEVEL, NoiseTest, worst_of
@@ -33,12 +33,11 @@ from accelstudy.diagnosis.file_format import (
     NextPosition,
     UpperLimit,
 )
-from accelstudy.diagnosis.held_out import Gap, relative_variance
+from accelstudy.diagnosis.held_out import Confirmation, relative_variance
 from accelstudy.diagnosis.next_positions import Separation, next_positions, separated
 from accelstudy.diagnosis.rules import RULES
 from accelstudy.diagnosis.space.frame import SessionFit
 from accelstudy.diagnosis.space.hypotheses import OUTLIER, Hypothesis
-from accelstudy.diagnosis.space.shapes import Place
 from accelstudy.diagnosis.visibility import upper_limits
 from accelstudy.effects.learned import LEARNED
 from accelstudy.leveling.error import attitudes_in_use, tilt_error
@@ -72,14 +71,14 @@ class CampaignDiagnosis:
     problem : Problem, the fit of the base model, all that it may lack, and the evidence
     campaign : Campaign, with a recognised gross error mended
     finding : Finding
-    gap : Gap, how far the disagreement shrinks by what was added
+    confirmation : Confirmation, what held-out positions confirm of it
     recognised : Recognition or None, a gross error of unit, axes or order
     """
 
     problem: Problem
     campaign: Campaign
     finding: Finding
-    gap: Gap
+    confirmation: Confirmation
     recognised: Recognition | None = None
 
     @property
@@ -119,11 +118,6 @@ class CampaignDiagnosis:
         reasons = dict.fromkeys(bumped, "bumped, as the diagnosis found")
         return CampaignFit(self.campaign.without(reasons), self.final.solution)
 
-    @property
-    def invisible(self) -> tuple[str, ...]:
-        """Effects that the parameters of the model absorb whatever their size."""
-        return self.frame.tested.invisible
-
     # --- the verdict --------------------------------------------------------------------------
 
     @cached_property
@@ -146,12 +140,7 @@ class CampaignDiagnosis:
     @cached_property
     def credible_set(self) -> tuple[Explanation, ...]:
         """Explanations of what is missing, most probable first; empty if nothing is."""
-        return self.finding.credible_set
-
-    @property
-    def certain(self) -> tuple[Part, ...]:
-        """What is missing whatever else is open."""
-        return self.finding.statement.certain
+        return self.finding.posterior.credible_set
 
     @cached_property
     def found(self) -> tuple[Found, ...]:
@@ -166,11 +155,6 @@ class CampaignDiagnosis:
     def effects(self) -> tuple[Found, ...]:
         """What the verdict names; nothing if that is unknown."""
         return () if self.verdict == "unknown" else self.found
-
-    @property
-    def place(self) -> Place | None:
-        """Coordinate and target of a learned function, which is found first."""
-        return self.finding.place if self.recognised is None else None
 
     @cached_property
     def used_positions(self) -> NDArray[np.bool_]:
@@ -256,16 +240,30 @@ class CampaignDiagnosis:
         return self.problem.exceeds_stated(self.final.solution)
 
     @property
+    def variances(self) -> dict[str, float]:
+        """Variances of unit weight of the base fit and of the extended one, if effects were added.
+
+        Both are in units of the noise that the base fit takes.
+        """
+        base, final = self.base, self.final.solution
+        variances = {"base": base.variance_posteriori}
+        if self.finding.chosen:
+            variances["extended"] = final.variance_posteriori * relative_variance(final, base)
+        return variances
+
+    @property
+    def unit(self) -> float:
+        """Variance of the noise in these units: as stated or, if none is, of what is left."""
+        return 1.0 if self.sigma_known else [*self.variances.values()][-1]
+
+    @property
     def fits(self) -> list[Fit]:
-        """Variances of unit weight of the base fit and of the final one, if that is another one."""
-        gap, fits = self.gap, [("base", self.base, self.gap.before)]
-        if gap.after is not None:
-            fits.append(("extended", self.final.solution, gap.after))
-        unit = 1.0 if self.sigma_known else fits[-1][2]
+        """The variances of unit weight beside those that simulated sessions have."""
         sizes = []
-        for model, fit, variance in fits:
+        for model, variance in self.variances.items():
+            fit = self.base if model == "base" else self.final.solution
             dof = min(fit.sigma_dof, 1e9)
-            r, measured = fit.redundancy, variance / unit
+            r, measured = fit.redundancy, variance / self.unit
             usual = special.fdtri(r, dof, [0.025, 0.975]).tolist()
             sizes.append(Fit(model=model, redundancy=r, simulated=usual, measured=measured))
         return sizes
@@ -288,7 +286,7 @@ class CampaignDiagnosis:
         finding = self.finding
         if finding.verdict not in MISSING:
             return ()
-        explanations = finding.credible_set if finding.verdict in ("unknown", LEARNED) else ()
+        explanations = self.credible_set if finding.verdict in ("unknown", LEARNED) else ()
         names = next((one.names for one in explanations if UNKNOWN in one.names), (UNKNOWN,))
         like = [
             LikelyPlace(coordinate=coordinate, target=target, posterior=p)
@@ -334,7 +332,7 @@ class CampaignDiagnosis:
         finding = self.finding
         names = [cause.name for cause in finding.chosen]
         if finding.verdict == "narrowed":
-            classes = [alike for one in finding.credible_set for alike in one.classes]
+            classes = [alike for one in self.credible_set for alike in one.classes]
             names += [name for alike in classes for name in alike]
         return tuple(upper_limits(self.final, self.noise.trusted, names))
 
@@ -343,7 +341,7 @@ class CampaignDiagnosis:
         """Shapes of the two most probable explanations, where further positions can decide."""
         if self.finding.verdict not in ("named", "narrowed", "unknown"):
             return ()
-        rivals = [one.best for one in self.finding.credible_set if one.is_effects]
+        rivals = [one.best for one in self.credible_set if one.is_effects]
         return tuple(rivals[:2]) if len(rivals) > 1 else ()
 
     @cached_property

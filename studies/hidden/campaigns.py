@@ -105,7 +105,8 @@ def tried(work: Callable[[], Any], what: str, failed: str = "") -> tuple[Any, st
 
 def outcome(d: CampaignDiagnosis) -> Row:
     """What a diagnosis says."""
-    test, held = d.base_fit.global_test, d.gap.held_out
+    test, held = d.base_fit.global_test, d.confirmation.test
+    certain = [part.names for part in d.finding.statement.certain if part.is_effect]
     fits = (d.base, d.final.solution) if d.verdict == "learned" else ()
     return {
         "verdict": d.verdict,
@@ -117,14 +118,14 @@ def outcome(d: CampaignDiagnosis) -> Row:
             {"names": one.names, "classes": one.classes, "posterior": _rounded(one.posterior)}
             for one in d.credible_set
         ],
-        "certain": [[name.name for name in part.names] for part in d.certain if part.is_effect],
-        "place": d.place,
+        "certain": [[name.name for name in names] for names in certain],
+        "place": d.shape and d.shape.place,
         "fits": [fit_squares(one) for one in fits],
-        "confirmed": bool(d.gap.confirmed),
-        "name_confirmed": d.gap.statement == "name",
+        "confirmed": d.confirmation.confirmed,
+        "name_confirmed": d.confirmation.statement == "name",
         "held_out_z": None if held is None else float(held.z),
-        "sigma0_before": float(d.gap.before),
-        "sigma0_after": None if d.gap.after is None else float(d.gap.after),
+        "sigma0_before": float(d.variances["base"]),
+        "sigma0_after": d.variances.get("extended"),
         "p_size": None if test is None else float(test.p_value),
     }
 

@@ -37,10 +37,10 @@ def test_a_warm_up_is_certain_whatever_is_open_beside_it():
     found = diagnose(campaign.with_arrays(forces=forces), NINE)
     assert found.verdict == "unknown"
     assert found.effects == ()
-    assert [name.name for name in found.certain[0].names] == ["warm_up"]
+    assert [name.name for name in found.finding.statement.certain[0].names] == ["warm_up"]
     assert "warm_up" in [effect.name for effect in found.extended_model.effects]
-    assert found.gap.before > 5 * found.gap.after
-    assert found.gap.confirmed
+    assert found.variances["base"] > 5 * found.variances["extended"]
+    assert found.confirmation.confirmed
     assert found.leveling.after < found.leveling.before / 3
     assert "The model lacks warm up, and" in verdict_lines(found)[0]
 

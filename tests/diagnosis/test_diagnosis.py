@@ -10,7 +10,7 @@ from usual import NINE, G
 from accelstudy.adjustment.quality import solve
 from accelstudy.approaches import get_approach
 from accelstudy.diagnosis.decision.statement import Reason
-from accelstudy.diagnosis.held_out import held_out_gap, split_positions
+from accelstudy.diagnosis.held_out import held_out_test, split_positions
 from accelstudy.diagnosis.pipeline import diagnose
 from accelstudy.diagnosis.report.words import verdict_lines
 from accelstudy.effects import HoldConditions
@@ -35,7 +35,7 @@ def test_held_out_z_is_standard_normal_if_nothing_is_missing(name, scheme, count
         observed = ideal.draw(Noise(), 1, rng)
         part, rest = observed.take(fitted), observed.take(held)
         base, more = (solve(model, approach, part) for model in (NINE, extended))
-        z.append(held_out_gap(base, more, rest, held, 1.0).z)
+        z.append(held_out_test(base, more, rest, held, 1.0).z)
     assert abs(np.mean(z)) < 4 / math.sqrt(len(z))
     assert abs(np.std(z) - 1) < 4 / math.sqrt(2 * len(z))
 
@@ -68,8 +68,8 @@ def test_a_large_effect_is_named_confirmed_and_placed_where_its_formula_has_it(e
     (named,) = found.found
     spec, place = effect.partition(":")[0], HIDDEN[effect]
     assert spec.partition("(")[0] in named.equivalence_class
-    assert found.gap.confirmed
-    assert found.gap.after < 2 < found.gap.before
+    assert found.confirmation.confirmed
+    assert found.variances["extended"] < 2 < found.variances["base"]
     if named.name == spec:  # estimates are only comparable in the same shape
         true = {p["name"]: p["value"] for p in truth["effects"][0]["parameters"]}
         for one in named.parameters:
@@ -97,7 +97,7 @@ def test_hard_clipping_has_its_name_or_none():
     """An output that does not change has no inverse; at this knee one axis never clips."""
     found = diagnose(campaign(1, effects=("saturation(knee=9.6): 1, 1, 1",)), NINE)
     assert (found.verdict, [one.name for one in found.found]) == ("named", ["saturation"])
-    assert found.gap.confirmed
+    assert found.confirmation.confirmed
     clipped = campaign(1, effects=("saturation(knee=9.4): 1, 1, 1",), approach="gravity")
     found = diagnose(clipped, NINE)
     assert found.verdict == "unknown"

@@ -31,9 +31,9 @@ def test_a_name_is_confirmed_only_where_no_other_could_leave_the_same(case):
     )  # fmt: skip
     found = diagnose(measured, NINE)
     assert found.verdict == "named"
-    assert found.gap.confirmed
-    assert set(found.gap.names) == GROUPS[case]
-    assert found.gap.statement == ("name" if len(GROUPS[case]) == 1 else "effect")
+    assert found.confirmation.confirmed
+    assert set(found.confirmation.names) == GROUPS[case]
+    assert found.confirmation.statement == ("name" if len(GROUPS[case]) == 1 else "effect")
     (line,) = render("confirmation", found)
     assert all(words(name) in line for name in GROUPS[case])
 
@@ -47,8 +47,8 @@ def test_no_name_is_confirmed_where_the_fit_leaves_more_than_the_stated_noise():
     )  # fmt: skip
     found = diagnose(measured, NINE)
     assert (found.verdict, found.found[0].name) == ("named", "thermal_bias")
-    assert found.gap.confirmed
-    assert found.gap.statement == "effect"
+    assert found.confirmation.confirmed
+    assert found.confirmation.statement == "effect"
     (line,) = render("confirmation", found)
     assert line.endswith("rather than a rival, since more is left than the stated noise.")
 

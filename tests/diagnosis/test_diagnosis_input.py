@@ -114,9 +114,9 @@ def test_positions_that_are_needed_to_hold_some_out_are_counted():
     )
     found = diagnose(measured, NINE)
     assert [f.name for f in found.found] == ["thermal_scale"]
-    assert not found.gap.confirmed
-    assert "needs 15 positions" in found.gap.reason
-    assert "18 in all; there are 16" in found.gap.reason
+    assert not found.confirmation.confirmed
+    assert "needs 15 positions" in found.confirmation.reason
+    assert "18 in all; there are 16" in found.confirmation.reason
 
 
 @pytest.mark.parametrize(("approach", "digits"), [(ROBOT, 16), (GRAVITY, 6)])

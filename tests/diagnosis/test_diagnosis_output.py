@@ -25,7 +25,7 @@ from accelstudy.campaign.format import write_campaign
 from accelstudy.diagnosis.decision.posterior import Posterior
 from accelstudy.diagnosis.decision.statement import Finding, Reason, statement_of
 from accelstudy.diagnosis.decision.verdict import decide
-from accelstudy.diagnosis.held_out import Gap
+from accelstudy.diagnosis.held_out import Confirmation
 from accelstudy.diagnosis.pipeline import diagnose
 from accelstudy.diagnosis.report.output import Diagnosis
 from accelstudy.diagnosis.report.words import verdict_lines
@@ -154,7 +154,9 @@ def test_a_narrowed_diagnosis_is_told_as_a_set(named, tmp_path):
         "narrowed", named.final, Reason(), named.finding.chosen, posterior,
         statement_of(posterior.credible_set, named.problem.singles.cosine),
     )  # fmt: skip
-    diagnosis = replace(otherwise(named, finding), gap=replace(named.gap, names=()))
+    diagnosis = replace(
+        otherwise(named, finding), confirmation=replace(named.confirmation, names=())
+    )
     content, text = told(diagnosis, tmp_path)
     (part,) = content["certain"]
     assert part["names"] == ["thermal_bias", "thermal_curve"]
@@ -222,7 +224,7 @@ def test_noise_alone_is_blamed_only_where_it_is_probable():
         scheme="fibonacci-36", **hold, noise_effects=("noise_level(kappa=4)",)
     )
     for found, sure in (
-        (CampaignDiagnosis(problem, drift, decide(problem, drift), Gap(1.0)), False),
+        (CampaignDiagnosis(problem, drift, decide(problem, drift), Confirmation()), False),
         (diagnose(noise, NINE), True),
     ):
         assert found.verdict == "noise_model"
@@ -282,7 +284,7 @@ def test_simulations_find_what_is_said_of_them(named, written, tmp_path):
         assert rms == pytest.approx(expected, rel=0.1)
         if simulated is fitted:
             assert 0.9 < np.mean((variances > low) & (variances < high)) < 0.99
-    assert [one.measured for one in named.fits] == [named.gap.before, named.gap.after]
+    assert [one.measured for one in named.fits] == [*named.variances.values()]
     assert tilt.promised < 0.5 * tilt.before
     left = f"Tilt error left: {number(tilt.before / MGON)} mgon as it is"
     assert left in text_of(written("named").page)

@@ -68,10 +68,10 @@ def test_the_table_is_the_function_of_the_model(learned):
 
 def test_what_was_learned_is_said(learned):
     shape = learned.shape
-    assert (learned.verdict, learned.place) == ("learned", ("yaw", "bias"))
+    assert (learned.verdict, learned.shape.place) == ("learned", ("yaw", "bias"))
     assert learned.found[0].posterior > 0.7
-    assert learned.gap.confirmed
-    assert learned.gap.after < 2 < learned.gap.before
+    assert learned.confirmation.confirmed
+    assert learned.variances["extended"] < 2 < learned.variances["base"]
     assert verdict_lines(learned)[0] == (
         "The model lacks something that has no name here: the bias of x and y depends on the yaw."
     )

@@ -20,7 +20,7 @@ from accelstudy.diagnosis.evidence.detection import (
     tail_probability,
 )
 from accelstudy.diagnosis.evidence.size import Level, log_mean
-from accelstudy.diagnosis.held_out import Gap
+from accelstudy.diagnosis.held_out import Confirmation
 from accelstudy.diagnosis.pipeline import diagnose
 from accelstudy.diagnosis.report.words import TEMPLATE, badge, verdict_lines
 from accelstudy.diagnosis.result import CampaignDiagnosis
@@ -93,7 +93,7 @@ def test_a_diagnosis_decides_at_the_levels(known, level):
         (REFUTATION_LEVEL - 1e-6, "unknown", False),
     ):
         vars(problem)["detection"] = replace(problem.detection, p_value=p)
-        found = CampaignDiagnosis(problem, measured, decide(problem, measured), Gap(1.0))
+        found = CampaignDiagnosis(problem, measured, decide(problem, measured), Confirmation())
         assert (found.verdict, found.reason.code == "weak") == (verdict, weak)
         assert badge(found) == ("accepted" if weak else verdict)
         if weak:

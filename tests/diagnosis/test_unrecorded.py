@@ -49,7 +49,7 @@ def wandering(t):
 def test_what_nobody_recorded_is_a_function_of_time(robot, columns):
     """Not noise: with the function in the model the sensor levels as the noise allows."""
     found = diagnose(session(wandering, robot=robot, **columns), NINE)
-    assert (found.verdict, found.place) == ("learned", ("time", "bias"))
+    assert (found.verdict, found.shape.place) == ("learned", ("time", "bias"))
     assert any("campaign has no temperature" in line for line in verdict_lines(found))
     _, before, after = found.leveling
     assert after < before / 2

@@ -131,7 +131,7 @@ def nonlinearity():
     said["reading of y less"] = number(-1e3 * y * g)
     posteriors = {one.names: one.posterior for one in d.credible_set}
     said["posterior of the asymmetry"] = number(posteriors["scale_asymmetry",])
-    said["posterior of an even nonlinearity"] = number(d.certain[0].posterior)
+    said["posterior of an even nonlinearity"] = number(d.finding.statement.certain[0].posterior)
     return said
 
 

@@ -258,12 +258,14 @@ class LearnedShape:
 
     Attributes
     ----------
+    place : Place, coordinate and target of the session
     effect : LearnedFunction
     axes : tuple of str, those of its c components in which it shows
     grid : (k,) array, the coordinate, SI
     values, sigmas : (k, c) arrays, h and its sigma there, SI
     """
 
+    place: Place
     effect: LearnedFunction
     axes: tuple[str, ...]
     grid: Array
@@ -307,6 +309,7 @@ def shape_of(finding: Finding, variance: float) -> LearnedShape:
     """
     effect, frame, solution = finding.chosen[0].shape.effect, finding.frame, finding.frame.solution
     assert isinstance(effect, LearnedFunction)
+    assert finding.place is not None
     at = coordinate_values(effect, frame)
     if effect.coordinate not in (*OF_EACH, "angle"):
         at = at[:, :1]
@@ -318,4 +321,4 @@ def shape_of(finding: Finding, variance: float) -> LearnedShape:
     most = np.max(np.abs(values) / sigmas, axis=0)
     shown = most >= min(RULES.z_component, most.max())
     axes = np.array(TARGETS[effect.target][0])[shown].tolist()
-    return LearnedShape(effect, tuple(axes), grid, values, sigmas)
+    return LearnedShape(finding.place, effect, tuple(axes), grid, values, sigmas)

@@ -222,15 +222,10 @@ class Finding:
     place: Place | None = None
 
     @property
-    def credible_set(self) -> tuple[Explanation, ...]:
-        """Smallest set of explanations that holds what is missing."""
-        return self.posterior.credible_set
-
-    @property
     def alternatives(self) -> tuple[Explanation, ...]:
         """Explanations any of which would be what was chosen."""
         if self.verdict != "unknown":
-            return self.credible_set
+            return self.posterior.credible_set
         added = {cause.members for cause in self.chosen}
         parts = [part for part in self.statement.certain if part.names[0].members in added]
         alternatives = product(*(part.names for part in parts))

@@ -197,7 +197,7 @@ def add_certain_effects(problem: Problem, finding: Finding) -> Finding:
     """Say what is certain, and add it to the fit whatever else is missing."""
     posterior, cosine = finding.posterior, problem.singles.cosine
     if finding.verdict != "unknown":
-        return replace(finding, statement=statement_of(finding.credible_set, cosine))
+        return replace(finding, statement=statement_of(posterior.credible_set, cosine))
     beyond = sum(one.posterior for one in posterior.all if UNKNOWN in one.names)
     if finding.reason.code == "misfit" or beyond > 1 - RULES.credible:
         posterior = posterior.doubting(_perhaps_imitations(problem, posterior))

@@ -164,9 +164,9 @@ class Evidence:
         count = SIMULATED_SIZES if len(total) > 1 else len(SHAPE_SIZES)
         ranks, logs = np.array([*map(len, shares)]), np.empty((len(total), len(shares), count))
         for rank in np.unique(ranks):
-            alike = np.flatnonzero(ranks == rank)
-            of = (np.stack([each[i] for i in alike]) for each in (squares, shares))
-            by_shape = self.densities_by_size(*of, total, SHAPE_SIZES[:count])
+            alike = np.flatnonzero(ranks == rank).tolist()
+            along, share = (np.stack([each[i] for i in alike]) for each in (squares, shares))
+            by_shape = self.densities_by_size(along, share, total, SHAPE_SIZES[:count])
             logs[:, alike] = np.swapaxes(by_shape, 0, 1)
         return np.asarray(np.logaddexp.reduce(logs + np.log(SHAPE_WEIGHTS[:count]), axis=-1))
 

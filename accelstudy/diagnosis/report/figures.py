@@ -76,7 +76,7 @@ def residual_figure(diagnosis: CampaignDiagnosis, positions: pd.DataFrame) -> Fi
     # Labels of narrow panels must not meet.
     ticks = 3 if len(panels) > 2 else 5
     # Residuals that exceed the stated noise must look too large.
-    sigma = _condition_sigma(d.base, 1.0 if d.sigma_known else d.gap.after or d.gap.before)
+    sigma = _condition_sigma(d.base, d.unit)
     for when, line in zip(rows, grid, strict=True):
         for (label, abscissa), ax in zip(panels.items(), line, strict=True):
             ax.axhspan(-2e3 * sigma, 2e3 * sigma, color=NOISE)

@@ -147,13 +147,13 @@ class Diagnosis(Result):
             },
             "posterior": d.probabilities,
             "credible_set": d.credible_set,
-            "certain": [self._certain(part) for part in d.certain],
+            "certain": [self._certain(part) for part in d.finding.statement.certain],
             "effects": d.effects,
             "suspects": [{"position": label, "p_value": p} for label, p in d.suspects.items()],
             "shape": self._shape(),
             "like": d.like,
             "gap": self._gap(),
-            "invisible_effects": d.invisible,
+            "invisible_effects": d.frame.tested.invisible,
             "untestable_effects": d.frame.tested.untestable,
             "upper_limits": d.upper_limits,
             "next_positions": d.next_positions,
@@ -180,12 +180,12 @@ class Diagnosis(Result):
 
     def _shape(self) -> dict[str, Any] | None:
         """Describe the function that was learned, if one was."""
-        shape, place = self.result.shape, self.result.place
-        if shape is None or place is None:
+        if (shape := self.result.shape) is None:
             return None
+        coordinate, target = shape.place
         return {
-            "coordinate": place[0],
-            "target": place[1],
+            "coordinate": coordinate,
+            "target": target,
             "axes": shape.axes,
             "subject": words.subject(shape),
             "function": shape.function,
@@ -193,21 +193,22 @@ class Diagnosis(Result):
 
     def _gap(self) -> dict[str, Any]:
         """Describe how far the disagreement shrinks by what was found."""
-        d, gap, held = self.result, self.result.gap, self.result.gap.held_out
+        d, confirmation = self.result, self.result.confirmation
+        variances, test = d.variances, confirmation.test
         tilt = dict.fromkeys(TiltErrors._fields)
         if d.leveling is not None:
             tilt = {name: value / MGON for name, value in d.leveling._asdict().items()}
         return {
-            "sigma0_squared": {"before": gap.before, "after": gap.after},
-            "held_out_mse": held or dict.fromkeys(("before", "after", "floor")),
-            "held_out_z": held and held.z,
-            "held_out_positions": d.campaign.positions[list(held.held) if held else []],
+            "sigma0_squared": {"before": variances["base"], "after": variances.get("extended")},
+            "held_out_mse": test or dict.fromkeys(("before", "after", "floor")),
+            "held_out_z": test and test.z,
+            "held_out_positions": d.campaign.positions[list(test.held) if test else []],
             "leveling_rms_mgon": tilt,
             "better_for_leveling": d.better_for_leveling,
-            "confirmed": gap.confirmed,
-            "confirmed_statement": gap.statement,
-            "confirmed_names": gap.names,
-            "reason": gap.reason,
+            "confirmed": confirmation.confirmed,
+            "confirmed_statement": confirmation.statement,
+            "confirmed_names": confirmation.names,
+            "reason": confirmation.reason,
         }
 
     @cached_property
@@ -223,10 +224,10 @@ class Diagnosis(Result):
             the base fit and by the final one: the output less that in the robot's attitude, or the
             norm of f_b less gravity
         """
-        d, campaign, held = self.result, self.result.campaign, self.result.gap.held_out
+        d, campaign, test = self.result, self.result.campaign, self.result.confirmation.test
         split = np.where(d.used_positions, "fit", "left out").astype(object)
-        if held is not None:
-            split[list(held.held)] = "held-out"
+        if test is not None:
+            split[list(test.held)] = "held-out"
         roll, pitch = d.frame.angles.T / GON
         columns = {
             "position": campaign.positions,
