@@ -16,14 +16,12 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy import stats
 
+from accelstudy.basics.arrays import Array
 from accelstudy.diagnosis.decision.problem import BaseFit
 from accelstudy.diagnosis.evidence.size import Level
 from accelstudy.diagnosis.rules import RULES
-
-Array = NDArray[np.float64]
 
 LEAST_SIGMA = 1e-9
 """m/s², least noise, for readings without any residual."""
