@@ -39,6 +39,11 @@ def value(number):
     return float(number.replace("−", "-"))
 
 
+def numbers(text):
+    """Numbers of a text, without their units."""
+    return [value(number) for number in NUMBER.findall(text)]
+
+
 def last_digit(number):
     """How many digits a number is printed with, and the worth of the last one."""
     mantissa, _, exponent = number.lower().lstrip("+-−").partition("e")

@@ -5,36 +5,6 @@ import re
 from html.parser import HTMLParser
 
 VOID = {"meta", "br", "link", "img", "hr", "input"}
-NUMBER = re.compile(r"(?<![\w.])[-−]?\d+(?:\.\d+)?(?:e[-+]?\d+)?(?: ?%)?")
-
-
-def numbers(text: str) -> list[float]:
-    """Numbers of a text, without their units."""
-    return [float(number.rstrip(" %").replace("−", "-")) for number in NUMBER.findall(text)]
-
-
-def digit_of(number: str) -> float:
-    """Worth of the last digit of a computed number; 0 of a count, which has no other way to round.
-
-    A whole number below 100 is a count, but for percentages.
-    """
-    mantissa, _, exponent = number.lstrip("-−").rstrip(" %").partition("e")
-    if not exponent and "." not in mantissa and "%" not in number and len(mantissa) < 3:
-        return 0.0
-    return 10.0 ** (int(exponent or 0) - len(mantissa.partition(".")[2]))
-
-
-def assert_told_alike(printed: str, quoted: str) -> None:
-    """Assert that a page quotes what a command prints, as far as all processors agree.
-
-    Words are the same, and spaces where there are any. A number may differ by one in the last
-    digit, which rounding decides where the number lies between two.
-    """
-    assert NUMBER.sub("#", printed).split() == NUMBER.sub("#", quoted).split()
-    pairs = zip(NUMBER.findall(printed), NUMBER.findall(quoted), strict=True)
-    for one, other in pairs:
-        differ = abs(numbers(one)[0] - numbers(other)[0])
-        assert differ <= 1.001 * max(digit_of(one), digit_of(other)), f"{one}, not {other}"
 
 
 def text_of(page: str) -> str:

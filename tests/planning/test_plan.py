@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 import yaml
 from calling import call, succeed
-from page_helpers import assert_told_alike
+from golden import compare
 from places import ROOT
 from usual import NINE, G
 
@@ -179,8 +179,8 @@ def test_what_usually_spoils_a_plan_stands_beside_its_accuracy():
 def test_the_answer_that_the_readme_quotes_is_the_commands_own(told):
     text = (ROOT / "README.md").read_text(encoding="utf-8").partition(f"accelstudy {QUESTION}\n")[2]
     quoted = re.search(r"```[^\n]*\n(.*?)```", text, re.DOTALL)[1]
-    lines = told[1].splitlines(keepends=True)
-    assert_told_alike("".join(lines[: quoted.count("\n")]), quoted)
+    printed = told[1].splitlines(keepends=True)[: quoted.count("\n")]
+    assert compare(quoted, "".join(printed))[0] == []
 
 
 @pytest.mark.parametrize(("target", "options", "said"), [

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 import quotes
 from example_helpers import EXAMPLES, run_example
-from page_helpers import numbers
+from golden import numbers
 from pictures import BATCH, MADE_BY, REPORTS, overview, seen, stale
 from places import ROOT
 from stand_ins import drawn
