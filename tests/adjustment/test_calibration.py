@@ -10,6 +10,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from closed_forms import roll_and_pitch
 from function_conditions import FunctionConditions
 from hypothesis import given
 from hypothesis import strategies as st
@@ -96,7 +97,7 @@ def test_robot_adjustment_is_that_of_the_papers_equations():
     ideal = session(NINE, X, scheme.directions)
     observed = ideal.draw(noise, 20, np.random.default_rng(10))
     observed = replace(observed, angles=(observed.angles + np.pi) % (2 * np.pi) - np.pi)
-    of_forces = np.arctan2(-observed.forces[..., 1], -observed.forces[..., 2])
+    of_forces = roll_and_pitch(observed.forces)[..., 0]
     assert np.abs(of_forces - observed.angles[..., 0]).max() > 6  # wrapping matters
     components = calibrate(NINE, ROBOT, observed)
     l = np.concatenate([observed.forces, observed.angles], axis=-1)

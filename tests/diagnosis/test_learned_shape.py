@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 from campaign_helpers import made
+from closed_forms import roll_and_pitch
 from usual import NINE, G
 
 from accelstudy.basics.units import MGON
@@ -21,13 +22,12 @@ def plain_campaign(rng):
     directions = np.column_stack([np.sqrt(1 - z**2) * np.cos(golden),
                                   np.sqrt(1 - z**2) * np.sin(golden), z])  # fmt: skip
     f = -G * rng.permutation(directions)
-    roll, pitch = np.arctan2(-f[:, 1], -f[:, 2]), np.arctan2(f[:, 0], np.hypot(f[:, 1], f[:, 2]))
     sigma_angle = 10 * MGON
     return made(
         f + SIGMA * rng.standard_normal((N, 3)),
         G,
         SIGMA,
-        angles=np.column_stack([roll, pitch]) + sigma_angle * rng.standard_normal((N, 2)),
+        angles=roll_and_pitch(f) + sigma_angle * rng.standard_normal((N, 2)),
         sigma_angle=sigma_angle,
         time=60.0 * np.arange(N),
         temperature=rng.uniform(10, 40, N),

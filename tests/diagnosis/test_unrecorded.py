@@ -5,6 +5,7 @@ import json
 import numpy as np
 import pytest
 from campaign_helpers import made
+from closed_forms import roll_and_pitch
 from usual import NINE, G
 
 from accelstudy.diagnosis.pipeline import diagnose
@@ -31,10 +32,9 @@ def session(course, seed=1, n=40, size=6.0, robot=True, sigma=0.002, stated=True
     directions /= np.linalg.norm(directions, axis=1, keepdims=True)
     time = 40.0 * np.arange(n) + rng.uniform(0, 10, n)
     moved = size * sigma * course(time / time[-1])[:, None] * np.array([1.0, -0.7, 0.5])
-    x, y, z = force = G * directions.T
-    angles = np.column_stack([np.arctan2(-y, -z), np.arctan2(x, np.hypot(y, z))])
-    read = 1.004 * force.T + [0.1, -0.05, 0.2] + moved + sigma * rng.standard_normal((n, 3))
-    rig = {"angles": angles, "sigma_angle": 1e-6} if robot else {}
+    force = G * directions
+    read = 1.004 * force + [0.1, -0.05, 0.2] + moved + sigma * rng.standard_normal((n, 3))
+    rig = {"angles": roll_and_pitch(force), "sigma_angle": 1e-6} if robot else {}
     return made(read, G, sigma if stated else None, **{"time": time, **rig, **columns})
 
 

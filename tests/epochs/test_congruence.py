@@ -2,12 +2,12 @@
 
 import numpy as np
 import pytest
+from usual import share_tolerance
 
 from accelstudy.adjustment.quality import POWER
 from accelstudy.epochs.congruence import LEVEL, Congruence, dof_of_squares
 
 N = 1000
-STANDARD_ERRORS = 3.3
 P = 9
 
 
@@ -30,10 +30,6 @@ def epochs(d, covariances, dof=np.inf):
 def estimated(rng, dof, n=N):
     """Estimates of a variance of 1; exact ones if it was stated."""
     return np.ones(n) if np.isinf(dof) else rng.chisquare(dof, n) / dof
-
-
-def tolerance(share, n=N):
-    return STANDARD_ERRORS * np.sqrt(share * (1 - share) / n)
 
 
 def design(n, each):
@@ -71,7 +67,7 @@ def test_few_positions_by_gravity_beside_many_with_a_robot_keep_the_level(n, rat
         not epochs(b - a, (v * q, w * r), (n - P, 63)).test.congruent
         for a, b, v, w in zip(one, other, s, t, strict=True)
     ]
-    assert np.mean(rejected) <= LEVEL + tolerance(LEVEL, draws)
+    assert np.mean(rejected) <= LEVEL + share_tolerance(LEVEL, draws)
 
 
 def test_an_unknown_variance_alone_is_that_of_student():
@@ -95,7 +91,7 @@ def test_a_detectable_change_is_found_about_as_often_as_is_said(dof, least):
     variances = zip(estimated(rng, dof, n), estimated(rng, dof, n), strict=True)
     found = [not epochs(d, (v * q, w * q), dof).test.congruent
              for d, (v, w) in zip(drawn, variances, strict=True)]  # fmt: skip
-    assert least - tolerance(POWER, n) <= np.mean(found) <= POWER + tolerance(POWER, n)
+    assert least - share_tolerance(POWER, n) <= np.mean(found) <= POWER + share_tolerance(POWER, n)
 
 
 def test_the_parameter_that_changed_is_named_and_no_other():
@@ -107,7 +103,7 @@ def test_the_parameter_that_changed_is_named_and_no_other():
     n = 200
     for true, said in ((none, ()), (one, (4,)), (two, (0, 4))):
         right = [epochs(d, q).fewest_changes == said for d in true + differences(rng, sum(q), n)]
-        assert np.mean(right) >= 1 - LEVEL - tolerance(LEVEL, n)
+        assert np.mean(right) >= 1 - LEVEL - share_tolerance(LEVEL, n)
 
 
 def test_parameters_that_cannot_be_told_apart_are_named_together():

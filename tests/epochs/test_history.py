@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 from page_helpers import assert_sound
 from session_helpers import SENSOR, write_document
+from usual import share_tolerance
 
 import accelstudy as acs
 from accelstudy.adjustment.quality import POWER
@@ -12,15 +13,10 @@ from accelstudy.epochs.congruence import LEVEL, Congruence
 from accelstudy.epochs.course import ParameterCourse
 
 N = 500
-STANDARD_ERRORS = 3.3
 DATES = np.array([-2.1, -1.7, -1.0, -0.6, -0.5, 0.0])
 """Years."""
 EQUAL, UNEQUAL = np.full(6, 0.7), np.array([0.5, 1.5, 0.8, 1.0, 2.0, 0.6])
 STATED = np.full(6, np.inf)
-
-
-def tolerance(share, n=N):
-    return STANDARD_ERRORS * np.sqrt(share * (1 - share) / n)
 
 
 def drawn(seed, sigmas, *, n=N, rate=0.0, course=DATES, scatter=0.0, dof=STATED):
@@ -48,8 +44,8 @@ def test_what_is_not_there_is_found_no_more_often_than_is_said(sigmas, dof):
     still = [change_of(c).test.p_value < LEVEL for c in drawn(1, sigmas, n=n, dof=dof)]
     drifting = [c.scatter.p_value < LEVEL for c in drawn(1, sigmas, n=n, dof=dof, rate=3.0)]
     for found in (still, drifting):
-        least = sure * (LEVEL - tolerance(LEVEL, n))
-        assert least <= np.mean(found) <= LEVEL + tolerance(LEVEL, n)
+        least = sure * (LEVEL - share_tolerance(LEVEL, n))
+        assert least <= np.mean(found) <= LEVEL + share_tolerance(LEVEL, n)
 
 
 @pytest.mark.parametrize(("sigmas", "scatter"), [(EQUAL, 0.0), (UNEQUAL, 0.5), (UNEQUAL, 5.0)])
@@ -58,9 +54,13 @@ def test_intervals_hold_rate_and_scatter(sigmas, scatter):
     drifting = drawn(2, sigmas, rate=0.4, scatter=scatter)
     rates, (low, high) = np.moveaxis([(c.rate.ci95, c.scatter.ci95) for c in drifting], 0, -1)
     held = np.mean((low <= scatter) & (scatter <= high))
-    assert held == pytest.approx(0.975 if scatter == 0 else 0.95, abs=tolerance(0.05))
+    assert held == pytest.approx(0.975 if scatter == 0 else 0.95, abs=share_tolerance(0.05, N))
     held = np.mean((rates[0] < 0.4) & (rates[1] > 0.4))
-    assert 0.95 - tolerance(0.05) <= held <= (0.95 + tolerance(0.05) if scatter == 5 else 1)
+    assert (
+        0.95 - share_tolerance(0.05, N)
+        <= held
+        <= (0.95 + share_tolerance(0.05, N) if scatter == 5 else 1)
+    )
 
 
 def test_a_step_is_no_drift_and_neither_drift_nor_scatter_is_a_step():
@@ -72,7 +72,7 @@ def test_a_step_is_no_drift_and_neither_drift_nor_scatter_is_a_step():
     within = [
         (abs(c.step.size - 40) < 2.78 * c.step.sigma, np.prod(c.rate.ci95) < 0) for c in courses
     ]
-    assert np.all(np.mean(within, axis=0) >= 0.95 - tolerance(0.05, 200))
+    assert np.all(np.mean(within, axis=0) >= 0.95 - share_tolerance(0.05, 200))
     for steady in ({"rate": 4.0}, {"rate": 20.0}, {"scatter": 4.0}):
         assert sum("steps" in c.found for c in drawn(6, EQUAL, n=100, **steady)) <= 3
 
@@ -95,7 +95,7 @@ def test_all_tests_have_one_level(true):
         found = [{*ParameterCourse(DATES, values[:, k], variances[:, k], STATED, LEVEL / 9).found}
                  for k in changed]  # fmt: skip
         wrong += any(f - right for f in found) or any(k >= many for k in changed)
-    assert wrong / n <= LEVEL + tolerance(LEVEL, n)
+    assert wrong / n <= LEVEL + share_tolerance(LEVEL, n)
 
 
 @pytest.mark.parametrize(("sigmas", "dof"), [(UNEQUAL, STATED), (EQUAL, np.full(6, 15.0))])
@@ -104,7 +104,7 @@ def test_what_is_detectable_is_found_as_often_as_is_said(sigmas, dof):
     (rate,) = change_of(known).detectable(DATES)
     found = [change_of(c).test.p_value < LEVEL for c in drawn(4, sigmas, n=150, dof=dof, rate=rate)]
     # With estimated sigmas the distribution is near it.
-    assert np.mean(found) == pytest.approx(POWER, abs=tolerance(POWER, 150) + 0.03)
+    assert np.mean(found) == pytest.approx(POWER, abs=share_tolerance(POWER, 150) + 0.03)
 
 
 YEARS = ("2023-01-01", "2023-07-01", "2024-01-01", "2024-06-30", "2025-01-01")

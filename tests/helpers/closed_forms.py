@@ -1,8 +1,8 @@
-"""Closed forms of linear theory, with which the adjustment and the Monte Carlo are compared.
+"""Closed forms, with which the adjustment, the leveling and the Monte Carlo are compared.
 
-They are valid for the models of bias, scale and non-orthogonality in schemes with octahedral
-moments: over the n directions ⟨x⟩ = ⟨xy⟩ = 0 and all third moments vanish, ⟨x⁴⟩ is the same for
-each axis and m = ⟨x²y²⟩ the same for each pair, and no moment such as ⟨x³y⟩ remains.
+Those of linear theory are valid for the models of bias, scale and non-orthogonality in schemes
+with octahedral moments: over the n directions ⟨x⟩ = ⟨xy⟩ = 0 and all third moments vanish, ⟨x⁴⟩ is
+the same for each axis and m = ⟨x²y²⟩ the same for each pair, and no moment such as ⟨x³y⟩ remains.
 """
 
 from __future__ import annotations
@@ -55,6 +55,12 @@ def gravity_sigma(
         "scale": relative * np.sqrt((1 - 3 * m) / (n * (1 / 3 - 3 * m))),
         "nonorthogonality": relative / np.sqrt(n * m) if m > 0 else np.inf,
     }
+
+
+def roll_and_pitch(f: Array) -> Array:
+    """Angles (..., 2), rad, of forces (..., 3) with x forward, y right, z down."""
+    x, y, z = np.moveaxis(f, -1, 0)
+    return np.stack([np.arctan2(-y, -z), np.arctan2(x, np.hypot(y, z))], axis=-1)
 
 
 def perfect_robot_ratio(directions: Array) -> dict[str, float]:

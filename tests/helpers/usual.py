@@ -1,5 +1,6 @@
 """What most tests calculate with: models, approaches and the sensor of the paper, and gravity."""
 
+import numpy as np
 import pytest
 
 from accelstudy.approaches import get_approach
@@ -19,3 +20,8 @@ GRAVITY, ROBOT = get_approach("gravity"), get_approach("robot")
 BOTH = pytest.mark.parametrize("approach", [GRAVITY, ROBOT], ids=lambda approach: approach.name)
 STANDARD_ERRORS = 4.5
 """Within which simulated numbers are to lie."""
+
+
+def share_tolerance(share, n):
+    """How far a simulated share of n cases may be off: 3.3 of its standard errors."""
+    return 3.3 * np.sqrt(share * (1 - share) / n)

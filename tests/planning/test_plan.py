@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 import yaml
 from calling import call, succeed
+from closed_forms import roll_and_pitch
 from golden import compare
 from places import ROOT
 from usual import NINE, G
@@ -214,12 +215,6 @@ def attitudes(tilt_range):
     sine = np.sqrt(1 - cosine**2)
     forces = -G * np.stack([sine * np.cos(azimuth), sine * np.sin(azimuth), cosine], axis=-1)
     return forces.reshape(-1, 3), np.repeat(weights / 24, 12)
-
-
-def roll_and_pitch(f):
-    """Angles of forces (..., 3) with x forward, y right, z down."""
-    x, y, z = np.moveaxis(f, -1, 0)
-    return np.stack([np.arctan2(-y, -z), np.arctan2(x, np.hypot(y, z))], axis=-1)
 
 
 def corrected(readings, p):
