@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -14,13 +15,22 @@ from accelstudy.campaign.calibration.file_format import CalibrationDocument
 from accelstudy.campaign.calibration.fit import campaign_estimability
 from accelstudy.campaign.calibration.sensor_calibration import ranged_values
 from accelstudy.campaign.calibration.wording import sentences
+from accelstudy.campaign.gross_errors.recognition import Recognition
 from accelstudy.sensors.frames import FRD
 
 
-def calibration_document(fit: CampaignFit) -> dict[str, Any]:
+def calibration_document(
+    fit: CampaignFit, mended: Recognition | None = None, warnings: Sequence[str] = ()
+) -> dict[str, Any]:
     """Describe a calibration: parameters with sigmas, correlation, accuracy, matrix and quality.
 
     All numbers are in SI but those whose key names another unit, and in forward, right, down.
+
+    Parameters
+    ----------
+    fit : CampaignFit
+    mended : Recognition, optional, gross errors that the campaign had before the fit
+    warnings : of a diagnosis, beside those of the campaign
     """
     campaign, header, solution = fit.campaign, fit.campaign.header, fit.solution
     covariance, sigma = fit.covariance, fit.sigma
@@ -73,7 +83,8 @@ def calibration_document(fit: CampaignFit) -> dict[str, Any]:
         "iterations": solution.iterations,
         "rms_norm_residual_mps2": np.sqrt(np.mean(fit.norm_residuals**2)),
         "affine": affine and dict(zip(("matrix", "bias_mps2"), affine, strict=True)),
-        "mended": None,
+        "mended": mended
+        and {"error": mended.name, "reason": mended.reason, "matrix": mended.matrix},
         "excluded": campaign.exclusions,
         "range_mps2": header.range_mps2,
         # Forces that the calibration cannot correct, as of exchanged axes, have no range.
@@ -83,7 +94,7 @@ def calibration_document(fit: CampaignFit) -> dict[str, Any]:
             if np.isfinite(values).all()
         },
         "log": header.log and header.log.model_dump(exclude_none=True, by_alias=True),
-        "warnings": campaign.warnings,
+        "warnings": [*campaign.warnings, *warnings],
         "quality": _quality(fit),
     }
     return CalibrationDocument.content(content)

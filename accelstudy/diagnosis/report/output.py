@@ -96,21 +96,13 @@ class Diagnosis(Result):
     @cached_property
     def _calibration(self) -> Calibration | str:
         """The calibration with what was found; why there is none if it cannot be assessed."""
-        recognised = self.result.recognised
+        warnings = words.render("warnings", self.result)
         try:
             fit = self.result.calibrated
-            content = calibration_document(fit)
+            content = calibration_document(fit, self.result.recognised, warnings)
         except (InputError, LinAlgError) as error:
             return str(error)
-        if recognised is not None:
-            matrix = recognised.matrix
-            content["mended"] = {
-                "error": recognised.name,
-                "reason": recognised.reason,
-                "matrix": None if matrix is None else matrix.tolist(),
-            }
-        warnings = [*fit.campaign.warnings, *words.render("warnings", self.result)]
-        return Calibration(fit, {**content, "warnings": warnings})
+        return Calibration(fit, content)
 
     # --- the files ----------------------------------------------------------------------------
 
