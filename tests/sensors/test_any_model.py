@@ -108,7 +108,9 @@ def test_a_calibration_with_the_noise_that_was_found():
     _, diagnosis, content = calibration_of(noise_effects=("noise_level(kappa=3)",))
     assert diagnosis.verdict == "noise_model"
     assert content["sigma_source"] == "a posteriori"
-    assert content["sigma_position_mps2"] == pytest.approx(diagnosis.sigma_position)
+    sigmas = diagnosis.final.residuals.sigmas[:, :3]
+    expected = np.sqrt(diagnosis.noise.variance) * np.mean(sigmas)
+    assert content["sigma_position_mps2"] == pytest.approx(expected)
 
 
 @pytest.mark.parametrize("frame", ["frd", "flu", "rfu"])
