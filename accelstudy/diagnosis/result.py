@@ -235,11 +235,6 @@ class CampaignDiagnosis:
         return self.problem.at(self.final).noise_tests(self.campaign)
 
     @property
-    def exceeds_stated(self) -> bool:
-        """Whether the final fit leaves more than the stated noise."""
-        return self.problem.exceeds_stated(self.final.solution)
-
-    @property
     def variances(self) -> dict[str, float]:
         """Variances of unit weight of the base fit and of the extended one, if effects were added.
 

@@ -43,13 +43,13 @@ Array = NDArray[np.float64]
 LEVEL, AXES, COLOUR, TAILS = "noise_level", "axis_noise", "coloured_noise", "heavy_tails"
 STEPS = "quantisation"
 NOISES = {
-    LEVEL: "the residuals are larger than sigma says, and have no pattern",
-    AXES: "the axes differ in noise",
-    COLOUR: "the noise lasts longer than a hold, or differs from hold to hold",
-    TAILS: "large residuals are more frequent than in a normal distribution",
     STEPS: "the readings are coarse",
+    COLOUR: "the noise lasts longer than a hold, or differs from hold to hold",
+    AXES: "the axes differ in noise",
+    TAILS: "large residuals are more frequent than in a normal distribution",
+    LEVEL: "the residuals are larger than sigma says, and have no pattern",
 }
-"""The reason that is given for each kind of wrong noise."""
+"""What may be wrong with the noise, the most specific first, and the reason that is given."""
 
 
 @dataclass(frozen=True)
@@ -224,8 +224,6 @@ def _step(values: Array, around: Array) -> float:
 
 LEAST_OF_REPEATS = 1e-12
 """Part of the squares that differences of repeats have at least."""
-SPECIFIC = (STEPS, COLOUR, AXES, TAILS, LEVEL)
-"""What may be wrong with the noise, the most specific first."""
 
 
 def worst_of(tests: Sequence[NoiseTest]) -> NoiseTest | None:
@@ -239,7 +237,7 @@ def worst_of(tests: Sequence[NoiseTest]) -> NoiseTest | None:
     ]
     others = RULES.level_noise / max(len(counted) - (level is not None), 1)
     failed = [t for t in counted if t.p_value < (REFUTATION_LEVEL if t is level else others)]
-    return min(failed, key=lambda t: SPECIFIC.index(t.name), default=None)
+    return min(failed, key=lambda t: [*NOISES].index(t.name), default=None)
 
 
 # --- repeated positions --------------------------------------------------------------------------

@@ -12,7 +12,6 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
 from numpy.typing import NDArray
 
-from accelstudy.adjustment.quality import Solution
 from accelstudy.basics.units import shown_unit, to_display
 from accelstudy.basics.wording import probability, words
 from accelstudy.diagnosis.decision.functions import LearnedShape
@@ -76,7 +75,7 @@ def residual_figure(diagnosis: CampaignDiagnosis, positions: pd.DataFrame) -> Fi
     # Labels of narrow panels must not meet.
     ticks = 3 if len(panels) > 2 else 5
     # Residuals that exceed the stated noise must look too large.
-    sigma = _condition_sigma(d.base, d.unit)
+    sigma = np.sqrt(d.unit) * d.frame.residuals.sigma
     for when, line in zip(rows, grid, strict=True):
         for (label, abscissa), ax in zip(panels.items(), line, strict=True):
             ax.axhspan(-2e3 * sigma, 2e3 * sigma, color=NOISE)
@@ -88,12 +87,6 @@ def residual_figure(diagnosis: CampaignDiagnosis, positions: pd.DataFrame) -> Fi
         line[0].set_ylabel(f"{title}\nresidual / (mm/s²)")
     figure.legend(*grid[0, 0].get_legend_handles_labels(), loc="outside upper left", ncols=7)
     return figure
-
-
-def _condition_sigma(solution: Solution, variance: float) -> float:
-    """Noise of a residual, m/s²: rms over positions and conditions, without that of parameters."""
-    covariance = solution.whitening @ np.swapaxes(solution.whitening, 1, 2)
-    return float(np.sqrt(variance * np.mean(np.einsum("ncc->nc", covariance))))
 
 
 def _components(positions: pd.DataFrame) -> list[str]:

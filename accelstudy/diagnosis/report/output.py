@@ -122,9 +122,9 @@ class Diagnosis(Result):
             "reason": "; ".join(words.clauses(d.reason)),
             "fits": d.fits,
             "global_test": {
-                "statistic": d.base.omega if test is None else test.statistic,
+                "statistic": d.base.omega,
                 "dof": d.base.redundancy,
-                "p_value": None if test is None else test.p_value,
+                "p_value": test and test.p_value,
                 "sigma": "known" if d.sigma_known else "unknown",
             },
             "noise": {

@@ -58,12 +58,10 @@ MIN_SAID = 0.1
 MIN_PLACE_SAID = 0.5
 """Posterior from which on it is worth a word where that which has a name lives."""
 
-HERE = sys.modules[__name__]
-
 
 def render(part: str, *content: object) -> list[str]:
     """Say a part of the template, one sentence a line."""
-    return render_lines(TEMPLATE, part, *content, w=HERE)
+    return render_lines(TEMPLATE, part, *content, w=sys.modules[__name__])
 
 
 def verdict_lines(diagnosis: CampaignDiagnosis) -> list[str]:

@@ -126,6 +126,11 @@ class Residuals:
         """Variance of unit weight a posteriori."""
         return float(self.z @ self.z) / self.redundancy
 
+    @property
+    def sigma(self) -> float:
+        """Noise of a condition, m/s²: rms over positions and conditions."""
+        return float(np.sqrt(np.mean(np.sum(self.whitening**2, axis=2))))
+
     @cached_property
     def blocks(self) -> Array:
         """R of each position, (n, c, c)."""
@@ -154,9 +159,8 @@ class Residuals:
 
         Angles count as the forces that they change.
         """
-        unit = np.sqrt(np.mean(np.sum(self.whitening**2, axis=2)))
         force, turned = signature.force, g * signature.angles
-        return np.sqrt(np.sum(force**2, axis=(0, 1)) + np.sum(turned**2, axis=(0, 1))) / unit
+        return np.sqrt(np.sum(force**2, axis=(0, 1)) + np.sum(turned**2, axis=(0, 1))) / self.sigma
 
     def stack(self, change: Array) -> Array:
         """Stack changes of unit weight, (n, c, k), with none of observed gravity, (m, k)."""
