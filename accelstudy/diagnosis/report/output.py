@@ -161,14 +161,8 @@ class Diagnosis(Result):
         names = [name.name for name in part.names]
         found = (one for one in self.result.found if one.name in names and one.parameters)
         added = next(found, None)
-        return {
-            "family": part.family,
-            "names": names,
-            "posterior": part.posterior,
-            "purity": part.purity,
-            "spec": added and added.spec,
-            "parameters": added.parameters if added else (),
-        }
+        spec, parameters = (None, ()) if added is None else (added.spec, added.parameters)
+        return {**vars(part), "names": names, "spec": spec, "parameters": parameters}
 
     def _shape(self) -> dict[str, Any] | None:
         """Describe the function that was learned, if one was."""
