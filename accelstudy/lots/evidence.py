@@ -105,7 +105,7 @@ class Sensor:
             problem = pose(self.fit(), np.random.SeedSequence(self.seed))
         except InputError:
             return SensorEvidence(self.campaign.name)
-        by_level, z = problem.detection.noise, problem.residuals.z
+        by_level, z = problem.noise_density, problem.residuals.z
         logs = dict(problem.singles.densities)
         axes, colour = problem.noise_evidence
         tails = evidence_of(tail_test(problem.residuals, problem.chance).p_value)
@@ -129,7 +129,7 @@ class Sensor:
         best = problem.singles.best
         return SensorEvidence(
             campaign=self.campaign.name,
-            p_value=problem.detection.p_value,
+            p_value=problem.p_value,
             odds={name: log - nothing for name, log in logs.items()},
             classes=tuple(one.members for one in problem.singles.classes),
             specs={name: best[name].effect.spec for name, shapes in effects.items() if shapes},

@@ -61,7 +61,7 @@ def test_noise_alone_counts_as_often_as_the_level_says(designs, approach, level,
         odds = log_mean(field.odds(evidence, z))
         p = np.array([tail_probability(*null, value) for value in odds])
         # Densities of many sets at once are rounded: one or two may move past the observed one.
-        assert p[0] == pytest.approx(found.p_value, abs=0.005)
+        assert p[0] == pytest.approx(found, abs=0.005)
         rates.append(np.mean(p < RULES.level(level.known)))
         seen.append(odds)
         weights.append(np.mean(null[1]))
@@ -92,7 +92,7 @@ def test_a_diagnosis_decides_at_the_levels(known, level):
         (REFUTATION_LEVEL + 1e-6, "no_effect" if known else "unknown", known),
         (REFUTATION_LEVEL - 1e-6, "unknown", False),
     ):
-        vars(problem)["detection"] = replace(problem.detection, p_value=p)
+        vars(problem)["p_value"] = p
         found = CampaignDiagnosis(problem, measured, decide(problem, measured), Confirmation())
         assert (found.verdict, found.reason.code == "weak") == (verdict, weak)
         assert badge(found) == ("accepted" if weak else verdict)

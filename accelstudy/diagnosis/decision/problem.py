@@ -24,7 +24,7 @@ from accelstudy.diagnosis.decision.posterior import NOT_LISTED, Explanation, Pos
 from accelstudy.diagnosis.decision.refits import Refit, best_refit
 from accelstudy.diagnosis.evidence import noise
 from accelstudy.diagnosis.evidence.candidates import Cause, Field, Singles, weigh_singles
-from accelstudy.diagnosis.evidence.detection import Chance, Detection, detect
+from accelstudy.diagnosis.evidence.detection import Chance, detect
 from accelstudy.diagnosis.evidence.noise import AXES, COLOUR, LEVEL, TAILS, NoiseTest
 from accelstudy.diagnosis.evidence.sets import set_prior, weigh_sets
 from accelstudy.diagnosis.evidence.size import Evidence, Level
@@ -243,7 +243,7 @@ class Problem:
     @cached_property
     def noises(self) -> list[Explanation]:
         """Explanations by wrong noise alone, one of each kind."""
-        by_level = self.detection.noise
+        by_level = self.noise_density
         nothing = float(np.logaddexp.reduce(by_level))
         axes, colour = self.noise_evidence
         tails = noise.most_evidence(noise.tail_test(self.residuals, self.chance).p_value)
@@ -259,10 +259,15 @@ class Problem:
         return [Explanation((Cause(name, (name,)),), float(log)) for name, log in logs.items()]
 
     @cached_property
+    def noise_density(self) -> Array:
+        """Log density of the residuals in noise alone, by the components of the level, (c,)."""
+        return self.evidence.noise_density(self.residuals.z @ self.residuals.z)
+
+    @cached_property
     def noise_evidence(self) -> tuple[float, float]:
         """Log evidence that the axes differ in noise, and that the noise is coloured."""
         residuals, evidence = self.residuals, self.evidence
-        nothing = float(np.logaddexp.reduce(evidence.noise_density(residuals.z @ residuals.z)))
+        nothing = float(np.logaddexp.reduce(self.noise_density))
         axes = noise.unequal_axes_density(residuals, evidence, self.base.within)
         return axes - nothing, noise.coloured_density(residuals, evidence) - nothing
 
@@ -326,8 +331,8 @@ class Problem:
     # --- whether, and what ------------------------------------------------------------------
 
     @cached_property
-    def detection(self) -> Detection:
-        """Whether anything is missing, all candidates together."""
+    def p_value(self) -> float:
+        """Probability of as much evidence that anything is missing by noise alone."""
         return detect(self.field, self.evidence, self.residuals, self.chance)
 
     @cached_property

@@ -39,7 +39,7 @@ def decide(problem: Problem, campaign: Campaign) -> Finding:
     if problem.exact:
         return Finding("no_effect", problem.frame, Reason.of("exact"))
     nothing = Finding("no_effect", problem.frame)
-    if problem.detection.p_value < RULES.level(problem.evidence.level.known):
+    if problem.p_value < RULES.level(problem.evidence.level.known):
         explained = explain(problem)
         finding = add_certain_effects(problem, explained)
         if finding.verdict != "unknown":
@@ -114,14 +114,14 @@ def dismiss_weak_evidence(problem: Problem, finding: Finding) -> Finding | None:
     The evidence for something is wider than the test of the calibration, and its level less strict.
     What it finds beyond that level counts if something of it has a name, or is certain.
     """
-    if not problem.evidence.level.known or problem.detection.p_value < REFUTATION_LEVEL:
+    if not problem.evidence.level.known or problem.p_value < REFUTATION_LEVEL:
         return None
     test = problem.base.solution.global_test
     if test is None or not test.accepted or test.powerless:
         return None
     if any(part.is_effect for part in finding.statement.certain):
         return None
-    return Finding("no_effect", problem.frame, Reason.of("weak", p=problem.detection.p_value))
+    return Finding("no_effect", problem.frame, Reason.of("weak", p=problem.p_value))
 
 
 # --- what is large: to first order it leaves so much that anything seems to be beside it --------

@@ -12,7 +12,6 @@ simulated values the bound P(S ≥ s) ≤ exp(−s) is used: in noise alone exp(
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
@@ -71,35 +70,14 @@ class Chance:
         return np.concatenate([errors[:half], changed])
 
 
-@dataclass(frozen=True)
-class Detection:
-    """Outcome of the test for anything that is missing.
-
-    Attributes
-    ----------
-    p_value : float, probability of as much total evidence by noise alone
-    densities : dict of candidate to log density of the residuals
-    noise : (c,) array, log density of the residuals in noise alone, by the components of the level
-    """
-
-    p_value: float
-    densities: Mapping[str, float]
-    noise: Array
-
-
-def detect(field: Field, evidence: Evidence, residuals: Residuals, chance: Chance) -> Detection:
-    """Test whether anything is missing."""
-    noise = evidence.noise_density(residuals.z @ residuals.z)
+def detect(field: Field, evidence: Evidence, residuals: Residuals, chance: Chance) -> float:
+    """Probability that noise alone shows as much total evidence that anything is missing."""
     if not field.candidates:
-        return Detection(1.0, {}, noise)
-    densities = field.densities(evidence, residuals.z)
-    observed = densities - np.logaddexp.reduce(noise)
+        return 1.0
+    nothing = np.logaddexp.reduce(evidence.noise_density(residuals.z @ residuals.z))
+    observed = field.densities(evidence, residuals.z) - nothing
     null = null_distribution(field, evidence, residuals, chance)
-    return Detection(
-        p_value=tail_probability(*null, float(log_mean(observed))),
-        densities=dict(zip(field.names, densities.tolist(), strict=True)),
-        noise=noise,
-    )
+    return tail_probability(*null, float(log_mean(observed)))
 
 
 def null_distribution(

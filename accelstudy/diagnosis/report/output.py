@@ -133,9 +133,9 @@ class Diagnosis(Result):
                 "tests": d.noise_tests,
             },
             "screening": {
-                "p_value": d.problem.detection.p_value,
+                "p_value": d.problem.p_value,
                 "simulations": d.problem.chance.simulations,
-                "candidates": [*d.problem.detection.densities],
+                "candidates": [*d.problem.field.names],
             },
             "posterior": d.probabilities,
             "credible_set": d.credible_set,

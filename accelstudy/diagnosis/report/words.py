@@ -88,7 +88,7 @@ def badge(diagnosis: CampaignDiagnosis) -> str:
 
 def too_few(diagnosis: CampaignDiagnosis) -> bool:
     """Whether nothing was found since nothing could be tested."""
-    return diagnosis.verdict == "no_effect" and not diagnosis.problem.detection.densities
+    return diagnosis.verdict == "no_effect" and not diagnosis.problem.field.names
 
 
 def noise_only(diagnosis: CampaignDiagnosis) -> float:
