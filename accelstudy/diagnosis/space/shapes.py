@@ -279,39 +279,23 @@ def _functions(frame: SessionFit) -> Iterator[tuple[Place, Array, Array]]:
 
     Their means over the holds are zero: what is the same in all of them is no function.
     """
-    robot = frame.solution.approach.uses_angles
+    residuals, robot = frame.residuals, frame.solution.approach.uses_angles
+    by_force, by_angle = np.split(residuals.by_observations, [3], axis=-1)
     for one in _coordinates(frame):
-        varying = less_its_mean(one.functions)
+        varying = one.functions - one.functions.mean(axis=0)
         for target in one.targets:
             place = (one.name, NAMED_TARGETS.get(target, target))
             if target in TURNING and not robot:
                 continue
-            rows = function_rows(frame, target, varying)
+            if target == "reading":
+                change = by_angle @ _for_each_component(varying, 2)
+            else:
+                change = by_force @ _change(varying, target, frame)
+            rows = residuals.stack(change)
             count = rows.shape[1] // one.priors.shape[1]
             # Only a bias is tried that changes as fast as that.
             rough = target != "bias" and len(one.priors) == len(LENGTHS)
             yield place, rows, np.tile(one.priors[rough:], count)
-
-
-def function_rows(frame: SessionFit, target: str, functions: Array) -> Array:
-    """What functions of a coordinate do to the conditions of unit weight, by components, (m, l).
-
-    Parameters
-    ----------
-    frame : SessionFit
-    target : str
-    functions : (n, a, k) array, k functions of each of a arguments
-    """
-    residuals = frame.residuals
-    seen = residuals.by_observations
-    if target == "reading":
-        return residuals.stack(seen[..., 3:] @ _for_each_component(functions, 2))
-    return residuals.stack(seen[..., :3] @ _change(functions, target, frame))
-
-
-def less_its_mean(functions: Array) -> Array:
-    """Functions (n, ...) that are zero on average over the holds."""
-    return functions - functions.mean(axis=0)
 
 
 def _change(h: Array, target: str, frame: SessionFit) -> Array:
