@@ -91,10 +91,8 @@ def data_sheets():
     sheets = {name: get_data_sheet(name) for name in data_sheet_names()}
     rows = []
     for name, quantity in QUANTITIES.items():
-        values = [getattr(sheet, name) for sheet in sheets.values()]
-        shown = [
-            "" if value is None else number(to_display(value, quantity.unit)) for value in values
-        ]
+        values = (getattr(sheet, name) for sheet in sheets.values())
+        shown = ("" if v is None else number(to_display(v, quantity.unit)) for v in values)
         rows.append((code(name), MEANINGS[name], shown_unit(quantity.unit), *shown))
     sources = [(code(name), sheet.title, sheet.source) for name, sheet in sheets.items()]
     return page(

@@ -1,7 +1,6 @@
 """Tables of what may stand in a file, from its JSON schema."""
 
 import json
-import math
 import re
 from pkgutil import resolve_name
 
@@ -34,7 +33,7 @@ def keys(source, before=""):
         rows, inner = [], []
         for key, value in block.get("properties", {}).items():
             links = []
-            text = _type(value, known, links)
+            text = _type(value, links)
             for link in links:
                 if link not in places:
                     places[link] = f"{path}{key}"
@@ -70,33 +69,24 @@ def _default(value, required):
     return code(json.dumps(default, ensure_ascii=False))
 
 
-def _type(value, known, links):
+def _type(value, links):
     """What a value may be; blocks of their own are added to `links`."""
     kind = value.get("type", "")
     if "$ref" in value:
-        name = value["$ref"].rpartition("/")[2]
-        if "properties" not in known[name]:
-            return _type(known[name], known, links)
-        links.append(name)
+        links.append(value["$ref"].rpartition("/")[2])
         return "block"
     if words := value.get("enum", [value["const"]] if "const" in value else ()):
         return " or ".join(code("null" if each is None else each) for each in words)
-    if any_of := value.get("anyOf") or value.get("oneOf"):
-        kinds = (_type(each, known, links) for each in any_of if each.get("type") != "null")
+    if any_of := value.get("anyOf"):
+        kinds = (_type(each, links) for each in any_of if each.get("type") != "null")
         return " or ".join(dict.fromkeys(kinds))
     if "prefixItems" in value:
         return f"{len(value['prefixItems'])} numbers"
     if kind == "array":
-        return f"list of {_type(value.get('items', {}), known, links)}".removesuffix(" of ")
-    if kind == "object" or "properties" in value:
+        return f"list of {_type(value.get('items', {}), links)}".removesuffix(" of ")
+    if kind == "object":
         inner = value.get("additionalProperties")
-        inner = _type(inner, known, links) if isinstance(inner, dict) else ""
+        inner = _type(inner, links) if isinstance(inner, dict) else ""
         return f"{inner} for each name" if inner else "block"
-    if isinstance(kind, list):
-        kind = next(k for k in kind if k != "null")
-    ends = [
-        f"{word} {value[key]:.6g}"
-        for key, word in ENDS.items()
-        if math.isfinite(value.get(key, math.inf))
-    ]
+    ends = [f"{word} {value[key]:.6g}" for key, word in ENDS.items() if key in value]
     return f"{PLAIN.get(kind, kind)} {', '.join(ends).replace(', to', ' to')}".strip()
