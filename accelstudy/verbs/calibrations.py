@@ -128,6 +128,7 @@ def apply(
     rate: kinds.Rate = None,
     variable: kinds.Variable = None,
     unit: kinds.Unit = None,
+    frame: kinds.Frame = None,
     start: Annotated[Quantity | None, si("s", 0.0, TIME.most)] = None,
     sigma: Annotated[Quantity | None, si("m/s^2", 0.0, SIGMA_READING.most)] = None,
 ) -> pd.DataFrame:
@@ -154,6 +155,8 @@ def apply(
         Unit of the time: s, ms, us or ns.
     unit : str
         Unit of the readings: m/s^2, g, mg or counts.
+    frame : str
+        Where x, y, z point: frd, flu, rfu …
     start : float in s, or str with a unit
         Seconds from the start of the calibration session to the first row. [default: 0]
     sigma : float in m/s², or str with a unit

@@ -172,6 +172,18 @@ def test_a_lag_follows_the_thermometer():
     assert "start of the calibration session" not in said
 
 
+def test_the_noise_of_a_thermometer_lags_as_well():
+    """At 10 rows a second 0.5 K of noise would make 1.5 mm/s² if it went to the bias as it is."""
+    effects, values = "thermal_bias(tau=400)", {"b_T_x": 3e-3}
+    time, rng = 0.1 * np.arange(40), np.random.default_rng(8)
+    rows = rows_of(effects, values, time=time, temperature=np.full(40, 25.0))
+    noisy = rows.assign(temperature=25 + 0.5 * rng.standard_normal(40))
+    noisy.loc[0, "temperature"] = 25.0  # that of the sensor
+    tables = [leveled_rows(calibrated(effects, values), t, sigma=0.0)[0] for t in (rows, noisy)]
+    plain, lagged = map(calibrated_in, tables)
+    np.testing.assert_allclose(lagged, plain, rtol=0, atol=1e-5)
+
+
 def test_a_drift_stays_where_the_session_left_it():
     values = {"d_x": 5e-5, "d_y": -4e-5, "d_z": 3e-5}
     own = calibrated("bias_drift", values)

@@ -345,6 +345,20 @@ def test_a_flight_log_that_ends_early(folder, tmp_path):
     assert "is damaged" in read_table(path).warnings[0]
 
 
+def test_a_bag_that_says_other_axes_than_that_of_the_calibration(folder, tmp_path):
+    """Nothing tells which is wrong, so a warning says how it is read, and what changes that."""
+    log = acs.read_log(folder / "several", variable="/a/imu")
+    calibration = acs.calibrate(acs.find_holds(log, gravity=G))
+    write_bag(tmp_path / "turned", TIME, {"/a/imu": FORCES * FLU})
+    as_before = acs.apply(calibration, tmp_path / "turned")
+    said = " ".join(as_before.attrs["warnings"])
+    assert "turned says that its axes are flu, and is read in frd" in said
+    turned = acs.apply(calibration, tmp_path / "turned", frame="flu")
+    assert "axes" not in " ".join(turned.attrs["warnings"])
+    roll = acs.apply(calibration, log)["roll_gon"]
+    np.testing.assert_allclose(turned["roll_gon"], roll, rtol=0, atol=1e-6)
+
+
 def test_a_bag_with_fewer_messages_than_it_says(tmp_path):
     write_bag(tmp_path / "bag", TIME, {"/imu/data": FORCES})
     header = tmp_path / "bag/metadata.yaml"
