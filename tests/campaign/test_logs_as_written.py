@@ -271,6 +271,7 @@ def folder(tmp_path_factory):
     (folder / "alone.mcap").write_bytes((folder / "two/two.mcap").read_bytes())
     fields, sample = "float x;float y;float z;", message("D", struct.pack("<H3f", 0, *range(3)))
     (folder / "untimed.ulg").write_bytes(b"".join([*ulog(fields), sample]))
+    (folder / "empty.ulg").write_bytes(b"".join(ulog(fields)))
     table().to_csv(folder / "frd.csv", index=False)
     return folder
 
@@ -299,6 +300,7 @@ def test_a_recording_has_forces_temperatures_and_axes(folder, name, settings, tu
     ("alone.mcap", "metadata.yaml is missing"),
     ("three.ulg", "which instance of sensor_accel? There are 0, 1, 2; give --variable 0"),
     ("untimed.ulg", "has no field 'timestamp'"),
+    ("empty.ulg", "no messages of sensor_accel, the raw readings; let PX4 log them"),
 ])  # fmt: skip
 def test_what_is_no_whole_recording_is_refused_in_a_line(folder, tmp_path, name, part):
     assert part in refusal("import", folder / name, "--out", tmp_path / "out")
@@ -374,10 +376,31 @@ def test_a_bag_with_fewer_messages_than_it_says(tmp_path):
 # --- other rates, and a file for each position ---------------------------------------------------
 
 
-def test_a_slow_log_has_longer_windows():
+CLOCKS = {
+    "millis": np.round(TIME * 1e3 + 2**32 - 20e3).astype(np.int64) % 2**32,
+    "us": np.round(TIME * 1e6 + 2**32 - 20e6).astype(np.int64) % 2**32 - 2**31,  # signed
+    "time": [f"{START + timedelta(seconds=41 + t):%H:%M:%S.%f}" for t in TIME],
+}
+
+
+@pytest.mark.parametrize("name", CLOCKS)
+def test_a_clock_that_begins_anew_is_counted_on(name):
+    log = table(CLOCKS[name], names=(name, "ax", "ay", "az"))
+    campaign = found(log)
+    assert_timed(campaign)
+    assert "the clock wraps around, and is counted on: row 1001" in said(campaign)
+    assert "wraps" not in said(found(table()))
+    with refused("not after the row above"):  # it may as well have been set back
+        found(log[(TIME < 19) | (TIME > 21)])
+
+
+def test_a_slow_log_has_longer_windows(tmp_path):
     """At 5 Hz a second has too few samples for a variance."""
     slow = np.concatenate([np.repeat(FORCES[i : i + 150 : 3], 2, axis=0) for i in range(0, N, 150)])
     found(table(time=np.arange(len(slow)) / 5, forces=slow))
+    # As PX4 logs by default; its times are in no other unit.
+    write_ulog(tmp_path / "slow.ulg", np.arange(len(slow)), [slow], np.full(len(slow), 20.0))
+    found(tmp_path / "slow.ulg")
 
 
 def test_rests_that_are_shorter_than_a_hold_are_not_replaced_by_slow_moves():

@@ -148,6 +148,10 @@ def read_ulog(path: Path, instance: str | None = None) -> RawTable:
     ):
         log = ULog(file, [_SENSOR])
     sensors = {str(each.multi_id): each.data for each in log.data_list}
+    if not sensors:
+        raise InputError(
+            f"{path}: no messages of {_SENSOR}, the raw readings; let PX4 log them (SDLOG_PROFILE)"
+        )
     values = sensors[choose(path, f"instance of {_SENSOR}", sensors, instance)]
     if missing := {"timestamp", *"xyz"} - values.keys():
         raise InputError(f"{path}: {_SENSOR} has no field {min(missing)!r}; it cannot be read")

@@ -51,6 +51,8 @@ _LESS_USUAL = {
     "temperature": r".*(?<![a-z])temp(erature)?s?c?(?![a-z]).*",
 }
 """Names that count where no column has a usual one."""
+_LEAST_USUAL = {"time": r"[mun]s|milli(s|seconds?)|micro(s|seconds?)"}
+"""Units as names, as of millis() of a microcontroller, which count after these."""
 _UNITS_OF: Mapping[str, Collection[str]] = {
     **dict.fromkeys((*(k for k in _USUAL if "f" in k), "vibration"), (*SENSOR_UNITS, "counts")),
     "time": CLOCK_UNITS,
@@ -242,7 +244,8 @@ def without_unit(name: str) -> str:
 def unit_in(name: str, key: str) -> str | None:
     """Unit that the name of the column of a key says; None if it says none of this quantity."""
     parts = (pattern.fullmatch(name.strip()) for pattern in (_IN_BRACKETS, _AS_ENDING))
-    units = (parse_unit(part[2]) for part in parts if part)
+    words = [part[2] for part in parts if part] + ([name] if key == "time" else [])
+    units = map(parse_unit, words)
     return next((unit for unit in units if unit in _UNITS_OF.get(key, ())), None)
 
 
@@ -251,7 +254,8 @@ def places_by_name(names: Sequence[str], key: str) -> list[int]:
     if names.count(key) == 1:
         return [names.index(key)]
     found: list[int] = []
-    for pattern in filter(None, (_USUAL.get(key), _LESS_USUAL.get(key))):
+    usual = (names_of.get(key) for names_of in (_USUAL, _LESS_USUAL, _LEAST_USUAL))
+    for pattern in filter(None, usual):
         matches = re.compile(pattern).fullmatch
         found = [i for i, name in enumerate(names) if _is_of(name, key, matches)]
         if len(found) == 1:

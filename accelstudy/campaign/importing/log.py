@@ -50,6 +50,8 @@ MAX_RATE_ERROR = 0.05
 told."""
 MAX_JITTER = 0.05
 """Mean deviation of the steps from whole periods, in periods, up to which a log is regular."""
+CLOCK_ENDS = (2**32, 86_400 * 10**9)
+"""Ticks after which a clock begins anew: a counter of 32 bits, and a time of day in ns."""
 _USUAL_RATE = 100.0
 """1/s; of several units of time the likely one gives the rate nearest to it."""
 
@@ -158,7 +160,7 @@ class Log:
         """What could not be read."""
         if self.parts:
             return [line for part in self.parts for line in part.warnings()]
-        said = [*self.raw.warnings, *self._contradicted_rate()]
+        said = [*self.raw.warnings, *self._contradicted_rate(), *self._wrapped_clock()]
         if self.lost.any():
             rows = np.flatnonzero(self.lost)
             each = "; ".join(self.describe(row) for row in rows[:MAX_NAMED].tolist())
@@ -168,6 +170,16 @@ class Log:
                 f"or absurd: {each}{more}"
             )
         return said
+
+    def _wrapped_clock(self) -> list[str]:
+        """Say that the clock of the column of time began anew."""
+        if "time" not in self.places:
+            return []
+        times, _ = _counted_from_first(_ticks(self.raw, self.places["time"]))
+        if (wraps := _wraps(times)).any():
+            row = int(np.argmax(wraps > 0))
+            return [f"the clock wraps around, and is counted on: {self.describe(row, 'time')}"]
+        return []
 
     def _contradicted_rate(self) -> list[str]:
         """Say that a column of time tells another rate than the one that was given."""
@@ -263,8 +275,12 @@ class Log:
         return int(np.sum(whole[whole > 1] - 1)) if regular else 0
 
     def unit_hint(self) -> str:
-        """Hint at the unit of time that would give a usual rate; empty if the rate is usual."""
-        if "time" not in self.places:
+        """Hint at the unit of time that would give a usual rate; empty if the rate is usual.
+
+        Recordings have a unit of their own, whatever the rate.
+        """
+        of_format = self.raw.layout.get("time_unit") == self.layout.time_unit
+        if "time" not in self.places or of_format:
             return ""
         factor = _time_factor(self.raw, self.layout, self.places)
         step = self.step / factor
@@ -349,7 +365,7 @@ def _convert(
     if "time" in places:
         time, start = _counted_from_first(_ticks(raw, places["time"]))
         factor = _time_factor(raw, layout, places)
-        time = _usable(time) * factor
+        time = _usable(time + _wraps(time)) * factor
         if "nanoseconds" in places:
             time += 1e-9 * _usable(raw.numbers(places["nanoseconds"]))
         first = next(iter(time[np.isfinite(time)]), 0.0)
@@ -377,6 +393,16 @@ def _convert(
 def _ticks(raw: RawTable, place: int) -> NDArray[Any]:
     """Times of a column, (n,), in its unit; dates in ns since 1970."""
     return raw.nanoseconds(place) if place in raw.dates else raw.numbers(place)
+
+
+def _wraps(times: Array) -> Array:
+    """Ticks to be added to times, (n,), since the clock began anew within a usual step."""
+    steps, added = np.diff(times), np.zeros(len(times))
+    if (steps < 0).any():
+        usual = np.nanmedian(steps)
+        for end in CLOCK_ENDS:
+            added[1:] += end * np.cumsum((0 < steps + end) & (steps + end <= GAP_RATIO * usual))
+    return added
 
 
 def _time_factor(raw: RawTable, layout: LogLayout, places: Mapping[str, int]) -> float:
