@@ -48,9 +48,9 @@ class TemperatureCourse:
             # After the last time the temperature stays as it is.
             rise = np.append(np.diff(self.temperature[first]) / np.diff(known), 0.0) * tau
             behind = np.zeros(len(known))
-            decay = memoryview(np.exp(-np.diff(known) / tau))  # its numbers are no NumPy ones
-            now = 0.0
-            for k, (lasting, end) in enumerate(zip(decay, memoryview(rise[:-1]), strict=True), 1):
+            decay, now = np.exp(-np.diff(known) / tau), 0.0
+            # Numbers of Python are faster than those of NumPy, one by one.
+            for k, (lasting, end) in enumerate(zip(decay.data, rise[:-1].data, strict=True), 1):
                 behind[k] = now = (now + end) * lasting - end
             self._knots[tau] = known, behind, rise
         return self._knots[tau]

@@ -56,7 +56,10 @@ def test_a_frozen_channel_does_not_lower_the_floor(tmp_path):
     holds = find_holds(opened(tmp_path, frozen))
     assert holds.windows.threshold == pytest.approx(sound.windows.threshold, rel=0.05)
     np.testing.assert_array_equal(spans(holds)[0], spans(sound)[0][[0, 1, 7]])
-    assert any("does not change over a window in" in text for text in holds.warnings)
+    (text,) = (text for text in holds.warnings if "does not change over a window in" in text)
+    # The window of 101 samples about the first that is frozen.
+    at, value = (edges[2, 0] + 50) / RATE, frozen[edges[2, 0], 0]
+    assert f"the first: fx, {value:.4g} m/s² at {at:.1f} s" in text
 
 
 def test_override_and_limits(tmp_path):

@@ -88,7 +88,8 @@ def test_temperature_vibration_and_range(turned):
     limit = 0.97 * np.abs(forces[edges[0, 0] : edges[0, 1]].mean(axis=0)).max()
     how = {"rate": RATE, "columns": "vibration=shake", "range": f"{limit / 9.80665:.6f}g"}
     campaign = acs.find_holds(table(forces, temp=warm, shake=0.3), **how)
-    assert any("left out: the sensor is saturated there" in text for text in campaign.warnings)
+    said = " ".join(campaign.warnings)
+    assert "left out: the sensor is saturated there" in said
     assert campaign.header.range_mps2 == pytest.approx(limit, rel=1e-5)
     assert campaign.n_positions < len(edges)
     expected = 10 + 10 * campaign.time * RATE / (n - 1)
@@ -113,6 +114,18 @@ def test_sigma_does_not_depend_on_the_offset():
             np.testing.assert_allclose(campaign.header.nominal.offset, right, atol=10)
             assert any("from the positions, as none was given" in note for note in campaign.notes)
     np.testing.assert_allclose(sigmas, sigmas[0], rtol=0.01)
+
+
+def test_a_range_that_is_not_known_is_asked_for_where_holds_are_saturated(turned):
+    """`apply` takes no reading for saturated without it."""
+    forces, edges = turned
+    limit = max(np.abs(forces[first:end].mean(axis=0)).max() for first, end in edges)
+    clipped = np.clip(forces, -limit, limit)  # half of the samples of a hold
+    for full_range in (None, limit):
+        campaign = acs.find_holds(table(clipped), rate=RATE, range=full_range)
+        said = " ".join(campaign.warnings)
+        assert "left out: the sensor is saturated there" in said
+        assert ("with a `range`, `apply` leaves" in said) == (full_range is None)
 
 
 # --- What was never still ------------------------------------------------------------------------

@@ -376,6 +376,11 @@ def test_a_bag_with_fewer_messages_than_it_says(tmp_path):
 # --- other rates, and a file for each position ---------------------------------------------------
 
 
+def test_noise_in_a_wrong_unit_is_no_motion():
+    with refused("these look like m/s^2, not g"):
+        acs.find_holds(table(), unit="g")
+
+
 CLOCKS = {
     "millis": np.round(TIME * 1e3 + 2**32 - 20e3).astype(np.int64) % 2**32,
     "us": np.round(TIME * 1e6 + 2**32 - 20e6).astype(np.int64) % 2**32 - 2**31,  # signed

@@ -49,7 +49,8 @@ def px4_parameters(calibration: SensorCalibration) -> tuple[str, list[str]]:
     calibration.check_device()
     if (unit := calibration.usual_layout.unit) != "m/s^2":
         raise InputError(
-            f"PX4 takes readings in m/s^2, and this calibration is of readings in {unit}"
+            f"PX4 takes readings in m/s^2, and this calibration is of readings in {unit}; "
+            "calibrate a flight log of PX4 (sensor_accel)"
         )
     gains, offsets = _fit(calibration)
     values: dict[str, float] = {}

@@ -150,7 +150,8 @@ def read_ulog(path: Path, instance: str | None = None) -> RawTable:
     sensors = {str(each.multi_id): each.data for each in log.data_list}
     if not sensors:
         raise InputError(
-            f"{path}: no messages of {_SENSOR}, the raw readings; let PX4 log them (SDLOG_PROFILE)"
+            f"{path}: no messages of {_SENSOR}, the raw readings; let PX4 log them "
+            "(SDLOG_PROFILE 64)"
         )
     values = sensors[choose(path, f"instance of {_SENSOR}", sensors, instance)]
     if missing := {"timestamp", *"xyz"} - values.keys():

@@ -19,6 +19,7 @@ from accelstudy.basics.arrays import Array
 from accelstudy.basics.errors import InputError
 from accelstudy.basics.units import STANDARD_GRAVITY
 from accelstudy.basics.wording import plural, short_list
+from accelstudy.campaign.gross_errors.recognition import check_size
 from accelstudy.campaign.importing.allan import MIN_DIFFERENCES, pooled_deviation
 from accelstudy.campaign.importing.columns import AXES, SDS
 from accelstudy.campaign.importing.log import Log
@@ -136,6 +137,8 @@ def find_holds(log: Log, settings: ImportSettings) -> Holds:
     why = Counter(reason for reason in table["left_out"] if reason)
     lost = [f"{plural(count, 'hold')} left out: {reason}" for reason, count in why.items()]
     warnings = [*windows.warnings, *lost, *too_short]
+    if SATURATED in why and settings.range is None:
+        warnings.append("with a `range`, `apply` leaves the rows of saturated readings empty")
     if not (table["left_out"] == "").any():
         if TURNS in why:
             raise _never_still(log, windows, "it turns slowly in all that looks like a hold")
@@ -328,6 +331,10 @@ def _holds_of(
     noise = hold_noise(records, log.step, windows.steps)
     holds = Holds(log, windows, table, noise, tuple(warnings), size)
     if _moves(holds, records):
+        # In a wrong unit noise may be as large as motion. The zero of counts is hardly known yet.
+        if (unit := log.layout.unit) != "counts":
+            conversion, readings = log.layout.conversion, np.concatenate(records)
+            check_size(f"{log.path}", readings, settings.gravity, unit, conversion)
         why = (
             f"what looks like rest varies by {windows.floor:.3g} m/s², like a hand, not like the "
             "noise of a sensor"

@@ -401,7 +401,7 @@ def _wraps(times: Array) -> Array:
     if (steps < 0).any():
         usual = np.nanmedian(steps)
         for end in CLOCK_ENDS:
-            added[1:] += end * np.cumsum((0 < steps + end) & (steps + end <= GAP_RATIO * usual))
+            added[1:] += end * np.cumsum((steps + end > 0) & (steps + end <= GAP_RATIO * usual))
     return added
 
 

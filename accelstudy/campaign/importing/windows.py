@@ -16,6 +16,7 @@ from accelstudy.basics.arrays import Array
 from accelstudy.basics.errors import InputError
 from accelstudy.basics.units import STANDARD_GRAVITY
 from accelstudy.basics.wording import plural
+from accelstudy.campaign.importing.columns import AXES
 from accelstudy.campaign.importing.log import GAP_RATIO, Log
 from accelstudy.campaign.importing.noise import step_in
 
@@ -130,8 +131,14 @@ def slide_windows(log: Log, width: int) -> Windows:
         np.maximum(variance, rounding**2, out=variance)
     elif (share := np.sum(frozen & covered) / covered.sum()) > 0:
         variance[frozen] = np.nan
+        first = int(np.argmax(frozen & covered))
+        readings = log.layout.axes.from_frd(log.forces[first - half : first + half + 1])
+        axis = int(np.argmin(np.ptp(readings, axis=0)))
+        name = log.raw.names[log.places[AXES[axis]]]
         warnings.append(
-            f"a channel does not change over a window in {100 * share:.2g} % of the log; left out"
+            f"a channel does not change over a window in {100 * share:.2g} % of the log; left out, "
+            f"as stuck or saturated; the first: {name}, {readings[0, axis]:.4g} m/s² at "
+            f"{log.time[first]:.1f} s"
         )
     return Windows(width, variance, about, steps, warnings)
 
