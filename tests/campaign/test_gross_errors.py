@@ -191,7 +191,8 @@ def test_columns_of_counts_are_exchanged_before_their_scales_and_offsets(differ,
     forces = ideal * [1.004, 0.997, 1.006] + [0.12, -0.08, 0.2] + noise
     counts = nominal.from_si(forces)[:, columns]
     layout = LogLayout(unit="counts", scale=[*scale], offset=[*offset], frame=frame.name)
-    header = {"unit": "counts", "nominal": nominal.__dict__, "log": layout}
+    of_axes = {"scale": nominal.scale, "offset": nominal.offset}
+    header = {"unit": "counts", "nominal": of_axes, "log": layout}
     angles = {"angles": angles_of(ideal), "sigma_angle": 5e-5} if robot else {}
     read = made(nominal.to_si(counts), sigma=0.002, header=header, **angles)
     found = recognise(read)
