@@ -136,7 +136,9 @@ def test_a_temperature_by_any_usual_name(name):
     assert f"temperature from {name}" in said(campaign)
 
 
-@pytest.mark.parametrize("names", [("imu_temp", "cpu_temp"), ("Temp [K]",), ("temp (°F)",)])
+@pytest.mark.parametrize("names", [
+    ("imu_temp", "cpu_temp"), ("Temp [K]",), ("temp (°F)",), ("temp_F",), ("imu_temp_raw",),
+])  # fmt: skip
 def test_a_temperature_that_is_not_used_is_said(names):
     campaign = found(table(**dict.fromkeys(names, 290.5)))
     assert campaign.temperature is None

@@ -284,8 +284,10 @@ def _is_of(name: str, key: str, matches: Callable[[str], Any]) -> bool:
         return True
     plain = _plain(without_unit(name))
     ending = _AS_ENDING.fullmatch(plain)
-    known = ending is not None and parse_unit(ending[2]) in own
-    return bool(matches(plain) or (ending and known and matches(ending[1])))
+    unit = parse_unit(ending[2]) if ending else None
+    if own and unit not in (None, "", *own):  # "temp_F"
+        return False
+    return bool(matches(plain) or (ending and unit in own and matches(ending[1])))
 
 
 def _plain(name: str) -> str:

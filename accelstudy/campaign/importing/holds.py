@@ -332,9 +332,8 @@ def _holds_of(
     holds = Holds(log, windows, table, noise, tuple(warnings), size)
     if _moves(holds, records):
         # In a wrong unit noise may be as large as motion. The zero of counts is hardly known yet.
-        if (unit := log.layout.unit) != "counts":
-            conversion, readings = log.layout.conversion, np.concatenate(records)
-            check_size(f"{log.path}", readings, settings.gravity, unit, conversion)
+        if (conversion := log.layout.conversion).unit != "counts":
+            check_size(f"{log.path}", np.concatenate(records), settings.gravity, conversion)
         why = (
             f"what looks like rest varies by {windows.floor:.3g} m/s², like a hand, not like the "
             "noise of a sensor"
