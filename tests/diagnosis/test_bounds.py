@@ -1,5 +1,7 @@
 """Physical bounds of parameters, and the uncertainty of settings: a knee in plain arithmetic."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from campaign_helpers import made
@@ -97,6 +99,11 @@ def test_the_uncertainty_of_a_knee_is_in_all_sigmas():
     np.testing.assert_allclose(np.sqrt(np.diag(fit.cofactors)), found[:9], rtol=1e-12)
     without = np.sqrt(np.diag(np.linalg.inv(white[:9] @ white[:9].T)))
     assert np.max(found[6:9] / without[6:9]) > 1.3
+    # Where the sensor loses more than what is beyond the knee, a reading may have no force.
+    folded = replace(fit, parameters=np.where(np.arange(9) == 6, 1.5, fit.parameters))
+    unknown = with_settings(problem.frame, folded, [chosen])
+    np.testing.assert_array_equal(unknown[:9, :9], fit.cofactors)
+    assert np.isnan(unknown[9, 9])
 
 
 def test_of_effects_that_are_the_same_here_one_is_fitted_whose_size_a_sensor_can_have():

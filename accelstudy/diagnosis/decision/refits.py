@@ -133,7 +133,8 @@ def with_settings(frame: SessionFit, fit: Solution, chosen: Sequence[Hypothesis]
 
     Returns
     -------
-    (u + s, u + s) array, of the parameters and of the logarithms of the settings
+    (u + s, u + s) array, of the parameters and of the logarithms of the settings; NaN of these
+        where a reading has no force with a setting a little beside
     """
     model, columns, weights = fit.model, [fit.design], [np.zeros(fit.design.shape[1])]
     problem = CalibrationProblem.of(model, fit.approach, fit.observed)
@@ -156,9 +157,11 @@ def with_settings(frame: SessionFit, fit: Solution, chosen: Sequence[Hypothesis]
         if low == high:  # the only one that shows: it was searched for on either side
             low, high = low / RANGE_FACTOR, high * RANGE_FACTOR
         weights.append(12 / np.log([high / low]) ** 2)
-    design = np.concatenate(columns, axis=1)
-    if design.shape[1] == len(fit.parameters) or not np.isfinite(design).all():
-        return fit.cofactors
+    design, u = np.concatenate(columns, axis=1), len(fit.parameters)
+    if design.shape[1] == u or not np.isfinite(design).all():
+        cofactors = np.full(2 * design.shape[1:], np.nan)
+        cofactors[:u, :u] = fit.cofactors
+        return cofactors
     # Parameters of very different units: of columns of unit length the inverse is exact enough.
     size = np.linalg.norm(design, axis=0)
     normal = (design / size).T @ (design / size) + np.diag(np.concatenate(weights) / size**2)
