@@ -104,10 +104,22 @@ class Solution:
         """Noise of a force of unit weight, m/s²: the mean over positions and axes."""
         return float(np.mean(np.asarray(self.observed.sigma_force)))
 
+    @cached_property
+    def noise(self) -> tuple[float, float]:
+        """Parts of Ω and r that tell of the noise: those of the positions.
+
+        The rest is that of gravity and of priors, whose sigmas do not depend on the noise.
+        """
+        rows, errors = self.prior
+        known = float(len(rows) - np.sum(self.basis[len(self.basis) - len(rows) :] ** 2))
+        if known < MIN_REDUNDANCY:  # as of gravity, which no position checks
+            return self.omega, self.redundancy
+        return self.omega - float(errors @ errors), self.redundancy - known
+
     @property
     def variance_posteriori(self) -> float:
-        """Variance of unit weight a posteriori σ̂0² = Ω/r; NaN without redundancy."""
-        return self.omega / self.redundancy if self.redundancy > 0 else np.nan
+        """Variance of unit weight a posteriori σ̂0² = Ω/r of the positions; NaN if r is below 1."""
+        return _variance(*self.noise)
 
     @property
     def sigma_posteriori(self) -> float:
@@ -117,24 +129,37 @@ class Solution:
     @property
     def global_test(self) -> GlobalTest | None:
         """Test of the whole model against the stated noise; None without redundancy."""
-        return global_test(self.omega, self.redundancy, sigma_dof=self.sigma_dof)
+        share = self.noise[1] / self.redundancy if self.redundancy > 0 else 1.0
+        return global_test(self.omega, self.redundancy, sigma_dof=self.sigma_dof / share**2)
 
     def judge_noise(self, stated: bool) -> NoiseJudgement:
         """Judge the noise by the global test, and say which variance of unit weight to quote.
 
         A stated noise is trusted unless the residuals refute it. If it is itself an estimate it is
         pooled with the residuals: a variance of 1 with ν degrees of freedom and one of Ω/r with r
-        give (ν + Ω)/(ν + r). If it is not trusted the noise is that of the residuals.
+        give (ν + Ω)/(ν + r). If it is not trusted the noise is that of the residuals, and what is
+        known of parameters directly may be refuted, too, as by a sensor of another type.
 
         Parameters
         ----------
         stated : bool, whether the noise was stated, and not taken from the residuals
         """
-        test, dof = self.global_test, self.sigma_dof
-        if not stated or (test is not None and not test.accepted):
+        test, dof, (omega, r) = self.global_test, self.sigma_dof, self.noise
+        if not stated:
             return NoiseJudgement(False, self.variance_posteriori)
-        pooled = (dof + self.omega) / (dof + self.redundancy) if np.isfinite(dof) else 1.0
-        return NoiseJudgement(True, pooled)
+        if test is not None and not test.accepted:
+            of_prior = _variance(self.omega - omega, self.redundancy - r, 1.0)
+            return NoiseJudgement(False, _variance(omega, r, 1.0), max(of_prior, 1.0))
+        return NoiseJudgement(True, (dof + omega) / (dof + r) if np.isfinite(dof) else 1.0)
+
+    def covariance(self, noise: NoiseJudgement) -> Array:
+        """Covariance matrix of the parameters with the noise that is quoted, (u, u).
+
+        Σ = Q (σ0² N₁ + σ1² N₂) Q with Q⁻¹ = N₁ + N₂, N₁ of the positions and N₂ of what is known of
+        parameters directly.
+        """
+        part, of_noise = self.prior[0] @ self.cofactors, noise.variance * self.cofactors
+        return np.asarray(of_noise + (noise.of_prior - noise.variance) * part.T @ part)
 
     @cached_property
     def whitening(self) -> Array:
@@ -173,15 +198,15 @@ class Solution:
 
     @cached_property
     def sigma_dof(self) -> float:
-        """Degrees of freedom of the stated noise in Ω; infinite where it is known.
+        """Degrees of freedom of the stated noise of the positions; infinite where it is known.
 
         Beside angles they are those of σ² of the forces over the square of the share that the
         forces have in r.
         """
         dof, angles = self.observed.sigma_dof, self.variances.shape[1] > 3
-        if not (angles and np.isfinite(dof) and self.redundancy > 0):
+        if not (angles and np.isfinite(dof) and self.noise[1] > MIN_REDUNDANCY):
             return dof
-        return float(dof / (self.shares[:, :3].sum() / self.redundancy) ** 2)
+        return float(dof / (self.shares[:, :3].sum() / self.noise[1]) ** 2)
 
     @cached_property
     def shares(self) -> Array:
@@ -195,6 +220,11 @@ class Solution:
     def root(self) -> tuple[Array, NDArray[np.int_]]:
         """H (n, c, c) with H Hᵀ = R⁺ of each position, and the rank of R, (n,)."""
         return root_of(self.blocks)
+
+
+def _variance(omega: float, r: float, unknown: float = np.nan) -> float:
+    """Variance of unit weight Ω/r; `unknown` where r is below 1."""
+    return omega / r if r > 1 - MIN_REDUNDANCY else unknown
 
 
 def column_basis(design: Array) -> Array:
@@ -349,10 +379,12 @@ class NoiseJudgement(NamedTuple):
     ----------
     trusted : bool, whether the noise is stated and nothing refutes it
     variance : float, variance of unit weight to quote; 1 where the stated noise is known
+    of_prior : float, that of what is known of parameters directly; more than 1 if it is refuted
     """
 
     trusted: bool
     variance: float
+    of_prior: float = 1.0
 
 
 @dataclass(frozen=True)
@@ -406,11 +438,11 @@ def position_tests(solution: Solution) -> PositionTests:
     e = solution.errors[: n * c].reshape(n, c)
     normalised = np.einsum("ncd,nc->nd", root, e)
     statistic = np.sum(normalised**2, axis=1)
-    r, omega = solution.redundancy, solution.omega
+    omega, r = solution.noise
     with np.errstate(divide="ignore", invalid="ignore"):
-        rest = np.where(r > q, np.maximum(omega - statistic, 0.0) / (r - q), np.nan)
-        studentised = statistic / q / rest
-        tau = np.sqrt(statistic / q / (omega / r if r > 0 else np.nan))
+        free = np.where(r - q > MIN_REDUNDANCY, r - q, np.nan)
+        studentised = statistic / q / (np.maximum(omega - statistic, 0.0) / free)
+        tau = np.sqrt(statistic / q / solution.variance_posteriori)
         nu = solution.sigma_dof
         p_known = special.chdtrc(q, statistic)
         if np.isfinite(nu):

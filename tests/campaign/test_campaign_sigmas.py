@@ -87,3 +87,17 @@ def test_a_wrong_noise_does_not_show_in_simulation_and_is_said():
     assert "nothing tells" in sentences(fit_campaign(few, NINE, GRAVITY), "finds")[0]
     with pytest.raises(InputError, match="no sigma to check"):
         check_sigmas(fit_campaign(few.with_sigma(None), NINE, GRAVITY))
+
+
+def test_residuals_tell_nothing_of_the_sigma_of_gravity():
+    """The noise is stated thrice too large, or is an estimate; gravity is as uncertain as ever."""
+    drawn = simulated_campaign({}, noise=Noise(0.002), sigma=0.006)
+    of_gravity = {"value_mps2": drawn.gravity, "sigma_mps2": 0.02}
+    refuted = drawn.with_header(gravity=of_gravity)
+    pooled = refuted.with_header(sensor_noise={"sigma_mps2": 0.003, "degrees_of_freedom": 9.0})
+    for campaign, state in ((refuted, "rejected"), (pooled, "accepted")):
+        one = acs.calibrate(campaign, approach="gravity")
+        assert one.state == state
+        assert "The sigmas contain that of gravity, 20.0 mm/s²." in one.verdict
+        table = check_sigmas(one.fit, replicates=1000, seed=5)
+        assert np.abs(table["ratio"] - 1).max() < 4.5 / math.sqrt(2 * 1000)

@@ -12,6 +12,7 @@ from campaign_helpers import made
 
 import accelstudy as acs
 from accelstudy.approaches import get_approach
+from accelstudy.basics.errors import InputError
 from accelstudy.campaign.calibration.fit import fit_campaign
 from accelstudy.campaign.format import write_campaign
 from accelstudy.campaign.sensor_type import SensorType, read_type
@@ -95,6 +96,30 @@ def test_a_sensor_that_is_not_of_the_type_is_refused():
     other = measured("mclaren-24", np.full(9, 1e-2), rng)
     assert fitted(other).global_test.accepted
     assert not fitted(replace(other, sensor_type=SensorType("t", 9, known))).global_test.accepted
+
+
+def test_a_type_tells_nothing_of_the_noise_of_positions():
+    """A vague prior changes nothing; six positions leave nothing that tells their noise."""
+    rng = np.random.default_rng(16)
+    vague = SensorType("t", 9, dict.fromkeys(MODEL.parameter_names, (0.0, 10.0)))
+    campaign = measured("mclaren-24", np.zeros(9), rng).with_sigma(None)
+    free, bound = fitted(campaign), fitted(replace(campaign, sensor_type=vague))
+    assert bound.dof == pytest.approx(free.dof, rel=1e-4)
+    np.testing.assert_allclose(bound.sigma, free.sigma, rtol=1e-4)
+    few = measured("faces-6", np.zeros(9), rng).with_sigma(None)
+    usual = SensorType("t", 9, dict.fromkeys(MODEL.parameter_names, (0.0, 0.1)))
+    with pytest.raises(InputError, match="nothing tells the noise of the 6 positions"):
+        fitted(replace(few, sensor_type=usual))
+
+
+@pytest.mark.parametrize("scheme", ["mclaren-24", "faces-6"])
+def test_sigmas_contain_that_a_sensor_is_of_another_type(scheme):
+    """The positions bear the stated noise, and what is known is refuted."""
+    usual = SensorType("t", 9, dict.fromkeys(MODEL.parameter_names, (0.0, 1e-3)))
+    other = measured(scheme, np.full(9, 1e-2), np.random.default_rng(17))
+    fit = fitted(replace(other, sensor_type=usual))
+    assert fit.state == "rejected"
+    assert np.all(np.abs(fit.parameters - 1e-2) < fit.sigmas_95 * fit.sigma)
 
 
 def test_each_command_takes_a_type(tmp_path):

@@ -106,8 +106,10 @@ class CampaignFit:
     @property
     def dof(self) -> float:
         """Degrees of freedom of the noise that is quoted; infinite where it is known."""
-        r = self.solution.redundancy
-        return self.solution.sigma_dof + r if self.noise.trusted else r
+        _, r = self.solution.noise
+        if self.noise.trusted:
+            return self.solution.sigma_dof + r
+        return r if r >= 1 else self.solution.redundancy
 
     @property
     def is_noise_known(self) -> bool:
@@ -128,22 +130,22 @@ class CampaignFit:
     def covariance(self) -> Array:
         """Covariance matrix of the model's parameters to quote, (u, u), SI."""
         u = self.model.n_parameters
-        return self.noise.variance * self.solution.cofactors[:u, :u]
+        return self.solution.covariance(self.noise)[:u, :u]
 
     @property
     def by_reference(self) -> Array | None:
         """Part of `covariance` that the calibration of a reference causes, (u, u), SI.
 
-        It is what would be gone if that calibration had no errors: Q_xc Q_cc⁻¹ Q_cx, with the
+        It is what would be gone if that calibration had no errors: Σ_xc Σ_cc⁻¹ Σ_cx, with the
         errors c that all holds share. None where no reference was used.
         """
         common = self.solution.observed.common
         if common is None or not self.approach.uses_angles:
             return None
-        q, u = self.solution.cofactors, self.model.n_parameters
+        sigma, u = self.solution.covariance(self.noise), self.model.n_parameters
         shared = slice(u, u + common.shape[-1])
-        part = q[:u, shared] @ np.linalg.solve(q[shared, shared], q[shared, :u])
-        return self.noise.variance * part
+        part = sigma[:u, shared] @ np.linalg.solve(sigma[shared, shared], sigma[shared, :u])
+        return np.asarray(part)
 
     @property
     def sigma(self) -> Array:
@@ -277,7 +279,7 @@ class CampaignFit:
         missing = np.zeros(2)
         stated = self.campaign.sigma_force
         if stated is not None and not self.noise.trusted:
-            excess = self.sigma_position_posteriori**2 - stated**2
+            excess = self.sigma_position**2 - stated**2
             by_output = np.mean(np.sum(tilt_by_output(*in_use) ** 2, axis=-1), axis=0)
             missing = np.sqrt(max(excess, 0.0) * by_output)
         part = self.by_reference

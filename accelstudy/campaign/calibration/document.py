@@ -35,6 +35,7 @@ def calibration_document(
     campaign, header, solution = fit.campaign, fit.campaign.header, fit.solution
     covariance, sigma = fit.covariance, fit.sigma
     sigma_priori = np.sqrt(np.diag(solution.cofactors))
+    sigma_posteriori = np.sqrt(np.diag(solution.covariance(solution.judge_noise(False))))
     affine = fit.model.affine(fit.parameters)
     content = {
         "campaign": campaign.name,
@@ -65,7 +66,7 @@ def calibration_document(
                 "sigma": sigma[i],
                 "ci95": fit.sigmas_95 * sigma[i],
                 "sigma_priori": sigma_priori[i] if campaign.sigma_force else None,
-                "sigma_posteriori": sigma_priori[i] * np.sqrt(solution.variance_posteriori),
+                "sigma_posteriori": sigma_posteriori[i],
                 "unit": parameter.unit,
                 "shown": {
                     "value": float(to_recorded(fit.parameters[i], parameter.unit)),

@@ -147,12 +147,21 @@ def fit_campaign(
         raise InputError(f"{campaign.name}: {_cause(campaign, model, theory)}")
     fit = CampaignFit(campaign, solve(model, approach, observed, adjustment))
     # Angles, and what is known a priori, need a sigma of the forces beside theirs.
-    for _ in range(3 if campaign.sigma_force is None and fit.solution.redundancy > 0 else 0):
+    unstated = campaign.sigma_force is None and fit.solution.redundancy > 0
+    for _ in range(3 if unstated else 0):
+        if np.isnan(fit.sigma_position_posteriori):
+            break
         sigma = max(fit.sigma_position_posteriori, 1e-9, least_sigma(campaign, approach))
         observed = replace(observed, sigma_force=sigma)
         adjustment = calibrate(model, approach, observed)
         if adjustment.converged[0]:
             fit = replace(fit, solution=solve(model, approach, observed, adjustment))
+    if unstated and np.isnan(fit.sigma_position_posteriori):
+        raise InputError(
+            f"{campaign.name}: nothing tells the noise of the {campaign.n_positions} positions, by "
+            "which they are weighed against what is known of the sensor; state it "
+            "(sensor_noise.sigma_mps2), or add positions"
+        )
     blur = sigma_to_show_above(campaign)
     if campaign.sigma_force is None and 0 <= fit.sigma_position_posteriori < MIN_SCATTER:
         raise InputError(
@@ -160,7 +169,7 @@ def fit_campaign(
             "readings in steps that are too coarse, so nothing tells their noise; state it "
             "(sensor_noise.sigma_mps2)"
         )
-    if fit.solution.redundancy > 0:
+    if np.isfinite(fit.sigma_position):
         # A stated noise may be too large; where residuals are larger, an effect may be missing.
         seen = fit.sigma_position
         blur = max(seen, UNIT_SIGMA) if campaign.sigma_force is None else min(seen, blur)

@@ -296,8 +296,8 @@ class Problem:
 
     def exceeds_stated(self, fit: Solution) -> bool:
         """Whether sigma is given, and the residuals of a fit are larger than it allows."""
-        trusted, variance = fit.judge_noise(self.base.level.known)
-        return self.base.level.known and not trusted and variance > 1
+        noise = fit.judge_noise(self.base.level.known)
+        return self.base.level.known and not noise.trusted and noise.variance > 1
 
     @property
     def lack_of_fit(self) -> float:
