@@ -378,7 +378,7 @@ def dates_of(
     Raises
     ------
     InputError
-        If a date is missing or wrong, or a calibration is given twice.
+        If a date is missing or wrong.
     """
     if dates and len(dates) != len(calibrations):
         raise InputError(
@@ -386,12 +386,8 @@ def dates_of(
             f"{plural(len(calibrations), 'calibration')}; give one for each, in their order, as "
             "2026-03-01"
         )
-    first: dict[bytes, str] = {}
     stated = list[datetime]()
     for i, (one, name) in enumerate(zip(calibrations, names, strict=True)):
-        # Noise never repeats: the same numbers are one campaign, whatever the file is called.
-        if (same := first.setdefault(one.parameters.tobytes(), name)) is not name:
-            raise InputError(f"{name}: has the numbers of {same}; each counts once")
         date = dates[i] if dates else one.document.date
         if date is None and len(calibrations) < MIN_COURSE:
             return []
@@ -403,6 +399,15 @@ def dates_of(
         with at(key("dates") if dates else f"{name}: date"):
             stated.append(read_date(date))
     return stated
+
+
+def check_different(calibrations: Sequence[SensorCalibration], names: Sequence[str]) -> None:
+    """Raise `InputError` if a calibration is given twice."""
+    first: dict[bytes, str] = {}
+    for one, name in zip(calibrations, names, strict=True):
+        # Noise never repeats: the same numbers are one campaign, whatever the file is called.
+        if (same := first.setdefault(one.parameters.tobytes(), name)) is not name:
+            raise InputError(f"{name}: has the numbers of {same}; each counts once")
 
 
 def size_text(size: float, unit: str) -> str:

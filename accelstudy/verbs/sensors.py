@@ -31,7 +31,8 @@ def compare(
 
     The congruence test of deformation analysis takes all parameters with both covariance matrices;
     if it rejects, the parameters that changed are named, at one level for all. The change is also
-    given in roll and pitch. Both calibrations have to be of one model.
+    given in roll and pitch. Both calibrations have to be of one model. If both campaigns have a
+    date, the older one comes first.
 
     The folder of results gets report.html, history.json and a figure.
 
@@ -55,11 +56,12 @@ def compare(
         accelstudy compare spring/calibration.json autumn/calibration.json --out both
     """
     from accelstudy.campaign.calibration.sensor_calibration import sensor_of
-    from accelstudy.epochs.history import History
+    from accelstudy.epochs.history import History, dates_of
 
     check_once((first, second), "calibration")
+    sensors = sensor_of(first, "first"), sensor_of(second, "second")
     # The range is in SI by `verb`.
-    return History((sensor_of(first, "first"), sensor_of(second, "second")), (), float(tilt_range))
+    return History(sensors, dates_of(sensors, (), ("first", "second")), float(tilt_range))
 
 
 @verb
@@ -109,11 +111,12 @@ def history(
             years
     """
     from accelstudy.campaign.calibration.sensor_calibration import sensor_of
-    from accelstudy.epochs.history import History, dates_of
+    from accelstudy.epochs.history import History, check_different, dates_of
 
     calibrations = paths(calibrations, "calibration", os.path.exists)
-    sensors = [sensor_of(one) for one in calibrations]
-    dated = dates_of(sensors, dates, [*map(str, calibrations)])
+    sensors, names = [sensor_of(one) for one in calibrations], [*map(str, calibrations)]
+    check_different(sensors, names)
+    dated = dates_of(sensors, dates, names)
     accuracy = None if tilt_accuracy is None else float(tilt_accuracy)  # in SI by `verb`
     return History(sensors, dated, float(tilt_range), accuracy, float(confidence))
 

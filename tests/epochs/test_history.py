@@ -144,3 +144,5 @@ def test_dates_come_from_the_campaigns(tmp_path):
         calibrations.append(acs.calibrate(folder, model="bias", approach="gravity"))
     content = acs.history(calibrations).content
     assert [c["date"][:10] for c in content["calibrations"]] == list(YEARS[:3])
+    two = acs.compare(*calibrations[1::-1])
+    assert [c["date"][:10] for c in two.content["calibrations"]] == list(YEARS[:2])
