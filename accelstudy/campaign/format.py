@@ -88,6 +88,12 @@ def _text_of(path: Path) -> str:
 
 def _columns_of(text: str, path: Path) -> Table:
     """Columns of the text of a CSV table; errors name `path`."""
+    head = text.lstrip().partition("\n")[0].strip()
+    if head and "," not in head:
+        raise InputError(
+            f"{path}: one column, {brief(head)}; expected columns between commas, and numbers "
+            "with a decimal point"
+        )
     try:
         rows = pd.read_csv(
             io.StringIO(text), header=None, dtype=str, na_filter=False, skipinitialspace=True
@@ -99,8 +105,6 @@ def _columns_of(text: str, path: Path) -> Table:
     except pd.errors.ParserError as error:
         raise InputError(f"{path}: not a whole CSV file ({one_line(error)})") from None
     names = [name.strip() for name in rows.iloc[0]]
-    if len(names) == 1:
-        raise InputError(f"{path}: one column, {brief(names[0])}; expected columns between commas")
     for name in names:
         if names.count(name) > 1:
             raise InputError(f"{path}: {name!r}: the column stands twice")
