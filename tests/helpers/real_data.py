@@ -78,7 +78,7 @@ def row(name, variant=""):
     sigma = d.campaign.sigma_force
     shown = "" if sigma is None else number(1e3 * float(np.mean(sigma)))
     given = f"{shown}, {variant or 'Allan'}" if shown else UNKNOWN
-    size = probability(None if d.global_test is None else d.global_test.p_value)
+    size = probability(None if (test := d.base_fit.global_test) is None else test.p_value)
     pattern = probability(d.problem.p_value if d.problem.field.names else None)
     said = f"`{d.verdict}`" + "".join(f": {words(f.name)}" for f in d.found)
     cells = (f"`{name}`", d.campaign.n_positions, d.base.redundancy, given, size, pattern, said)
