@@ -6,12 +6,13 @@ import numpy as np
 import pytest
 import yaml
 from calling import succeed
-from log_helpers import G, session, table
+from log_helpers import RATE, G, session, table
 from scipy.io import savemat
 
 import accelstudy as acs
 from accelstudy.basics.units import STANDARD_GRAVITY, angles_in
 from accelstudy.campaign.format import read_campaign
+from accelstudy.schemes import get_scheme
 
 
 def test_turning_is_not_noise():
@@ -89,3 +90,14 @@ def test_command_with_everything(tmp_path):
     assert campaign.header.sensor == "A-1"
     np.testing.assert_allclose(np.linalg.norm(campaign.forces, axis=1), G, atol=0.01)
     assert not (tmp_path / "out" / "segmentation.png").exists()
+
+
+def test_long_holds_do_not_make_short_ones_look_wrong():
+    """One sigma stands for all holds: its square is the mean of theirs, not that of long ones."""
+    directions = get_scheme("fibonacci-18").directions
+    for still, warned in (((300, 2500, 2500), True), ((1000, 1200, 1100), False)):
+        log, _ = session(seed=3, still=still, forces=G * directions)
+        campaign = acs.find_holds(table(log), rate=RATE, gravity=G)
+        white = 0.02 * np.sqrt(np.mean(1 / campaign.n_samples))
+        assert campaign.sigma_force == pytest.approx(white, rel=0.2)
+        assert warned == any("share one sigma" in one for one in campaign.warnings)

@@ -328,5 +328,6 @@ def _warnings(holds: Holds, gravity: float) -> tuple[str, ...]:
         holds.log,
         missing=[(i, p) for i, p in enumerate(parts, 1) if parts[1:] and i not in table.index],
         turned=turned,
+        shortened=noise.accuracy.duration < 0.99 * table["n"].median() * holds.log.step,
         lost=[(table.index[lost][0], name) for name, lost in unknown.items() if lost.any()],
     )

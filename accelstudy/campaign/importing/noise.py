@@ -27,6 +27,8 @@ MAX_NORM_RATIO = 1.5
 """Largest over smallest norm of the means of one sensor in gravity."""
 MIN_SPREAD = 0.25
 """Rms of the means along their thinnest direction, over gravity; of a sphere 0.58."""
+MAX_OVER_HARMONIC = 1.1
+"""Length of a typical hold over the harmonic mean of all lengths, at most."""
 LONGEST_RECORD = 2**20
 """Samples of a hold that are used for the Allan deviation; later ones count for the mean only."""
 MAX_READINGS = 2**15
@@ -110,7 +112,9 @@ def hold_noise(records: Sequence[Array], step: float, resolution: ArrayLike = 0.
     covariances = np.array([np.cov(record, rowvar=False) for record in records])
     squares = np.einsum("nij,nik,nkj->j", frames, covariances, frames) / len(records)
     sd = np.sqrt(np.maximum(squares, 0.0))
-    typical = int(np.median([len(record) for record in records]))
+    lengths = np.array([len(record) for record in records])
+    # The harmonic mean has the mean variance of white noise; beyond it short holds would refute it.
+    typical = int(min(np.median(lengths), MAX_OVER_HARMONIC / np.mean(1 / lengths)))
     short = [record[:LONGEST_RECORD] for record in records]
 
     def accuracy_in(channels: slice, least: float) -> tuple[AllanDeviation, MeanAccuracy]:
