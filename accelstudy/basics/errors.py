@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 import reprlib
 import unicodedata
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Collection, Iterable, Iterator, Mapping
 from contextlib import contextmanager
 from contextvars import ContextVar
 from difflib import get_close_matches
@@ -102,3 +102,9 @@ class UnknownNameError(InputError):
         known = tuple(known)
         hint = did_you_mean(name, known)
         super().__init__(f"unknown {kind} {brief(name)}{hint} (known: {', '.join(known)}{more})")
+
+
+def check_name(kind: str, name: object, known: Collection[str]) -> None:
+    """Raise `UnknownNameError` unless a name is one of those that there are."""
+    if name not in known:
+        raise UnknownNameError(kind, name, known)

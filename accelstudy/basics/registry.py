@@ -12,7 +12,7 @@ from pkgutil import iter_modules
 from typing import Any, ClassVar, Generic, Self, TypeVar
 
 from accelstudy.basics import plugins
-from accelstudy.basics.errors import InputError, UnknownNameError
+from accelstudy.basics.errors import InputError, UnknownNameError, check_name
 
 Item = TypeVar("Item")
 Kind = TypeVar("Kind", bound=type[Any])
@@ -146,8 +146,7 @@ class WithSettings:
     def __init__(self, **settings: float) -> None:
         takes = {setting.name: setting for setting in self.takes}
         for name, value in settings.items():
-            if name not in takes:
-                raise UnknownNameError(f"setting of the {self.kind} {self.name!r}", name, takes)
+            check_name(f"setting of the {self.kind} {self.name!r}", name, takes)
             setting = takes[name]
             if value != setting.none and not setting.above < value < setting.below:
                 raise InputError(

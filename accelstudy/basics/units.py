@@ -14,7 +14,7 @@ from contextvars import ContextVar
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
-from accelstudy.basics.errors import InputError, UnknownNameError, brief
+from accelstudy.basics.errors import InputError, UnknownNameError, brief, check_name
 
 if TYPE_CHECKING:
     import numpy as np
@@ -198,8 +198,7 @@ def to_si(value: ArrayLike, unit_of_value: str, unit: str) -> NDArray[np.float64
         If `unit_of_value` is no unit of that quantity.
     """
     known = UNITS.get(unit, {unit: 1.0})
-    if unit_of_value not in known:
-        raise UnknownNameError(f"unit of a quantity in {unit}", unit_of_value, known)
+    check_name(f"unit of a quantity in {unit}", unit_of_value, known)
     return _numbers(value) * known[unit_of_value]
 
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 from collections.abc import Iterable
 from dataclasses import dataclass
+from glob import escape
 from os import PathLike
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -95,12 +96,9 @@ def files_of(given: Iterable[str | PathLike[str]]) -> list[Path]:
     """
     files: list[Path] = []
     for path in (path_of("log", one, "a path, or one DataFrame outside a list") for one in given):
-        if path.is_dir() and not (path / BAG_OF_FOLDER).is_file():
-            inside = [p for p in path.iterdir() if p.is_file() and not p.name.startswith(".")]
-            inside.sort(key=natural)
-        else:
-            found = matches(path, os.path.isfile)
-            inside = [path] if found is None else [*map(Path, found)]
+        is_folder = path.is_dir() and not (path / BAG_OF_FOLDER).is_file()
+        found = matches(Path(escape(str(path)), "*") if is_folder else path, os.path.isfile)
+        inside = [path] if found is None else [*map(Path, found)]
         if not inside:
             raise InputError(f"{path}: no file there")
         files += inside

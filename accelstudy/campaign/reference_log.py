@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from itertools import permutations, product
 from pathlib import Path
@@ -67,17 +68,24 @@ def reference_of(given: Mapping[str, Any]) -> ReferenceLog | None:
         return None
     sensor, columns = usable_reference(calibration), dict(columns or {})
     layout = {"time": columns.pop("time", None), "columns": columns}
-    try:
-        said = {name: value for name, value in layout.items() if value not in (None, {})}
+    said = {name: value for name, value in layout.items() if value not in (None, {})}
+    with _remedy(
+        "it is read like the log of `reference`, and `reference_columns` fx=…,fy=…,fz=…,time=… "
+        "names other columns"
+    ):
         log = read_log(path, said, sensor.usual_layout)
         log.check_timed()
+    return ReferenceLog(sensor, join([log]), offset or 0.0)
+
+
+@contextmanager
+def _remedy(text: str) -> Iterator[None]:
+    """Name another remedy than what an error within the block ends with, and whose log it is."""
+    try:
+        yield
     except InputError as error:
         wrong = str(error).partition("; ")[0]
-        raise InputError(
-            f"`reference_log` {wrong}; it is read like the log of `reference`, and "
-            "`reference_columns` fx=…,fy=…,fz=…,time=… names other columns"
-        ) from None
-    return ReferenceLog(sensor, join([log]), offset or 0.0)
+        raise InputError(f"`reference_log` {wrong}; {text}") from None
 
 
 @dataclass(frozen=True)
@@ -124,7 +132,8 @@ class ReferenceLog:
         records, lost = self._records(holds, float(np.nan_to_num(apart)) + self.offset)
         table = holds.table.drop(index=[*lost])
         means, used = np.array([records[n].mean(axis=0) for n in table.index]), table.left_out == ""
-        self._check_size(means, gravity)
+        with _remedy("it is read in the unit of the log of which `reference` was made"):
+            check_size(f"{self.log.path}", means, gravity, self.log.layout.conversion)
         own, forces = self.calibration.correct(means), table[["fx", "fy", "fz"]].to_numpy() - offset
         frame = self._frame(forces[used], own[used])
         angles = angles_of(frame.to_frd(own))
@@ -190,17 +199,6 @@ class ReferenceLog:
                 "gives the seconds to add to the times of the reference"
             )
         return records, lost
-
-    def _check_size(self, means: Array, gravity: float) -> None:
-        """Check that means of the reference, (n, 3), are as large as gravity."""
-        layout, where = self.log.layout, f"`reference_log` {self.log.path}"
-        try:
-            check_size(where, means, gravity, layout.unit, layout.conversion)
-        except InputError as error:
-            raise InputError(
-                f"{str(error).split('; give')[0]}; it is read in the unit of the log of which "
-                "`reference` was made"
-            ) from None
 
     def _frame(self, forces: Array, own: Array) -> Frame:
         """Quarter turns from the axes of the reference to those of a sensor.

@@ -102,11 +102,11 @@ class Campaign:
             for name in columns.names
         }
         table = self.holds[self.used].drop(columns="left_out").rename(columns=names)
-        beside = "without a robot" if self.angles is None else "with a robot"
+        angles = "without a robot" if self.angles is None else "with a robot"
         if self.header.reference is not None:
-            beside = f"beside the sensor of {self.header.reference.calibration}"
-        said = f"{plural(self.n_positions, 'position')} {beside}"
-        return notebook_html(f"Campaign {self.name}", "; ".join([said, *self.warnings]), table)
+            angles = f"beside the sensor of {self.header.reference.calibration}"
+        counted = f"{plural(self.n_positions, 'position')} {angles}"
+        return notebook_html(f"Campaign {self.name}", "; ".join([counted, *self.warnings]), table)
 
     @property
     def name(self) -> str:

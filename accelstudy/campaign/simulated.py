@@ -13,7 +13,7 @@ import numpy as np
 from accelstudy.approaches import get_approach
 from accelstudy.basics import bounds
 from accelstudy.basics.arrays import Array
-from accelstudy.basics.errors import InputError, UnknownNameError
+from accelstudy.basics.errors import InputError, check_name
 from accelstudy.basics.registry import WithSettings
 from accelstudy.basics.units import MGON
 from accelstudy.campaign.session import Campaign
@@ -136,8 +136,7 @@ def _directions(settings: SimpleNamespace, rng: np.random.Generator) -> Array:
     once, first = get_scheme(settings.scheme).directions, settings.repeat_first
     bounds.POSITIONS.check_key("repeats: number of positions", settings.repeats * len(once) + first)
     directions = np.tile(once, (settings.repeats, 1))
-    if settings.order not in ORDERS:
-        raise UnknownNameError("order", settings.order, ORDERS)
+    check_name("order", settings.order, ORDERS)
     if settings.order == "random":
         directions = rng.permutation(directions)
     if first > len(directions):

@@ -22,7 +22,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from accelstudy.basics.arrays import Array
-from accelstudy.basics.errors import UnknownNameError
+from accelstudy.basics.errors import check_name
 from accelstudy.design.task import Task
 
 RIDGE = 1e-12
@@ -123,8 +123,7 @@ def _above_ridge(normal: Array) -> Array:
 
 def get_criterion(name: str, task: Task) -> Criterion:
     """Return a criterion by its name."""
-    if name not in TEXTS:
-        raise UnknownNameError("criterion", name, TEXTS)
+    check_name("criterion", name, TEXTS)
     angles = task.tilt_weights
     forms = {"I": angles.mean(axis=0)[None], MINIMAX: angles}
     u = len(task.names)

@@ -22,6 +22,7 @@ from scipy.special import softmax
 
 from accelstudy.adjustment import Observations
 from accelstudy.adjustment.quality import Solution, solve
+from accelstudy.basics.arrays import Array
 from accelstudy.basics.errors import InputError
 from accelstudy.basics.progress import stage
 from accelstudy.diagnosis.decision.functions import fit_of_place, most_probable_place
@@ -35,8 +36,6 @@ from accelstudy.diagnosis.space.hypotheses import Hypothesis
 from accelstudy.diagnosis.space.residuals import Residuals
 from accelstudy.diagnosis.space.shapes import Place
 from accelstudy.effects import HoldConditions
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)

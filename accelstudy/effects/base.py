@@ -24,7 +24,7 @@ from typing import Any, ClassVar, Literal
 import numpy as np
 
 from accelstudy.basics.arrays import Array
-from accelstudy.basics.errors import InputError, UnknownNameError
+from accelstudy.basics.errors import InputError, check_name
 from accelstudy.basics.registry import RegistryWithSettings, WithSettings
 from accelstudy.basics.units import STANDARD_GRAVITY
 from accelstudy.effects.components import (
@@ -264,8 +264,7 @@ def get_effect(spec: str) -> Effect:
     names = [parameter.name for parameter in effect.parameters]
     wanted = [name.strip() for name in match[2].split(",")]
     for name in wanted:
-        if name not in names:
-            raise UnknownNameError(f"parameter of the effect {effect.name!r}", name, names)
+        check_name(f"parameter of the effect {effect.name!r}", name, names)
     return effect.with_parameters(tuple(i for i, name in enumerate(names) if name in wanted))
 
 

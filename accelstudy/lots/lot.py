@@ -41,7 +41,7 @@ from accelstudy.lots.passes import (
 from accelstudy.sensors.models import compose, composition_name
 from accelstudy.sensors.sensor import SensorModel
 
-Beside: TypeAlias = Callable[[Sequence[LotEffect]], Pass]
+WeighWith: TypeAlias = Callable[[Sequence[LotEffect]], Pass]
 """Weighs all sensors with some effects in their models."""
 
 LEVEL_OF_REST = 0.01
@@ -119,9 +119,9 @@ class LotDiagnosis:
     def odd(self) -> list[OddSensor]:
         """Odd sensors, the surest first: by what the others lack, or by the size of an effect."""
         by_size = [
-            OddSensor(self.evidence[i].campaign, one.names, float(one.apart[i]), by_size=True)
+            OddSensor(self.evidence[i].campaign, one.names, float(one.other_size[i]), by_size=True)
             for one in self.effects
-            for i in np.argsort(-one.apart, kind="stable")[: count_odd(one.apart)]
+            for i in np.argsort(-one.other_size, kind="stable")[: count_odd(one.other_size)]
         ]
         first = {one.campaign: one for one in (*by_size, *self.last.odd)}
         return sorted(first.values(), key=lambda one: -round(one.posterior, 3))
@@ -136,7 +136,9 @@ class LotDiagnosis:
         """Names of what the model lacks for each sensor, and their posterior."""
         having = {one.names[0]: one.having for one in self.effects}
         odd, states = {one.campaign for one in self.odd}, list[SensorState]()
-        usual = np.prod([1 - self.last.posterior_odd, *(1 - one.apart for one in self.effects)], 0)
+        usual = np.prod(
+            [1 - self.last.posterior_odd, *(1 - one.other_size for one in self.effects)], 0
+        )
         for i, (one, p_usual) in enumerate(zip(self.evidence, usual.tolist(), strict=True)):
             names = [name for name, p in having.items() if p[i] > MIN_HAVING]
             sure = math.prod(max(p[i], 1 - p[i]) for p in having.values())
@@ -176,7 +178,7 @@ def weigh_lot(
     with _processes(cores, len(sensors)) as mapped:
         passes, effects = [Pass.of(sensors, mapped)], list[LotEffect]()
 
-        def beside(effects: Sequence[LotEffect]) -> Pass:
+        def weigh_with(effects: Sequence[LotEffect]) -> Pass:
             """Weigh all sensors with some effects, and with the noise that they tell together."""
             models = [
                 extended(model, [one.specs[i] for one in effects if one.spec])
@@ -190,13 +192,13 @@ def weigh_lot(
             # The first pass is by what each campaign says of its noise, all others by the lot.
             if len(passes) > 1 and (not new or len(effects) == MAX_EFFECTS):
                 break
-            chosen = _settled([*effects, *new], beside)
-            after = beside(chosen)
+            chosen = _settle([*effects, *new], weigh_with)
+            after = weigh_with(chosen)
             if not any(one.base for one in after.evidence):  # no campaign determines so much
                 break
             passes, effects = [*passes, after], chosen
         nameless = any(one.spec is None and one.names[0] not in NOISES for one in effects)
-        explained = not nameless and _explained(passes[-1], effects, beside)
+        explained = not nameless and _explained(passes[-1], effects, weigh_with)
     if explained:
         whole = extended(model, [one.spec for one in effects if one.spec])
         return LotDiagnosis(tuple(passes), whole, tuple(effects))
@@ -204,7 +206,7 @@ def weigh_lot(
     return LotDiagnosis(tuple(passes), model, close=close, explained=False)
 
 
-def _settled(effects: Sequence[LotEffect], beside: Beside) -> list[LotEffect]:
+def _settle(effects: Sequence[LotEffect], weigh_with: WeighWith) -> list[LotEffect]:
     """Effects, each as it is found beside the others, as the last one was.
 
     One effect may imitate the sum of two: beside the second one the first one shows what it is.
@@ -213,14 +215,14 @@ def _settled(effects: Sequence[LotEffect], beside: Beside) -> list[LotEffect]:
     for k, before in enumerate(effects):
         others = [*settled[:k], *settled[k + 1 :]]
         if k < len(effects) - 1 or changed:
-            found = beside(others).found
+            found = weigh_with(others).found
             if found is not None and not found.is_one_of(others):
                 settled[k] = found
                 changed |= found.names[0] not in before.names
     return settled
 
 
-def _explained(now: Pass, effects: Sequence[LotEffect], beside: Beside) -> bool:
+def _explained(now: Pass, effects: Sequence[LotEffect], weigh_with: WeighWith) -> bool:
     """Whether what was found explains the lot, with the most probable of what is not sure."""
     effects = list(effects)
     while now.p_value_of_usual < LEVEL_OF_REST:
@@ -230,7 +232,7 @@ def _explained(now: Pass, effects: Sequence[LotEffect], beside: Beside) -> bool:
         if best.spec is None or len(effects) >= MAX_EFFECTS:
             return False
         effects.append(best)
-        now = beside(effects)
+        now = weigh_with(effects)
     return any(one.base for one in now.evidence)
 
 

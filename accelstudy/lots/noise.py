@@ -16,14 +16,12 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy import stats
 
+from accelstudy.basics.arrays import Array
 from accelstudy.diagnosis.decision.problem import BaseFit
 from accelstudy.diagnosis.evidence.size import Level
 from accelstudy.diagnosis.rules import RULES
-
-Array = NDArray[np.float64]
 
 LEAST_SIGMA = 1e-9
 """m/s², least noise, for readings without any residual."""
@@ -129,8 +127,8 @@ def noises_of_lot(
             redundancies = np.array([one.solution.redundancy for one in group.values()])
             before, odd_share = factor, 0.0 if source == NOTHING else ODD_SHARE
             factor, freedom = agreement(ratios, redundancies, odd_share)
-            beside = any(one.solution.approach.uses_angles for one in group.values())
-            if not beside or abs(factor / before - 1) < NOISE_TOLERANCE:
+            uses_angles = any(one.solution.approach.uses_angles for one in group.values())
+            if not uses_angles or abs(factor / before - 1) < NOISE_TOLERANCE:
                 break
             again = {i: fit(i, factor * own[i]) for i in group}
             group = {i: one for i, one in again.items() if one is not None}

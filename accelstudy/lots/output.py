@@ -93,26 +93,26 @@ class Lot(Result):
         InputError
             If fewer than two campaigns can be judged.
         """
-        usable, without, first = list[Campaign](), dict[str, str](), dict[bytes, str]()
+        usable, left_out, first = list[Campaign](), dict[str, str](), dict[bytes, str]()
         names = distinct([campaign.name for campaign in campaigns])
-        for given, own in zip(campaigns, names, strict=True):
-            campaign = given.with_header(name=own)
+        for unnamed, own in zip(campaigns, names, strict=True):
+            campaign = unnamed.with_header(name=own)
             # Noise never repeats: the same numbers are the same log, whatever its folder.
             if (same := first.setdefault(campaign.forces.tobytes(), own)) != own:
-                without[own] = f"{own}: has the readings of {same}; each sensor counts once"
+                left_out[own] = f"{own}: has the readings of {same}; each sensor counts once"
                 continue
             try:
                 fit_base(campaign, model, approach or usual_approach(campaign))
                 usable.append(campaign)
             except InputError as error:
-                without[own] = str(error)
+                left_out[own] = str(error)
         if len(usable) < MIN_SENSORS:
-            why = next(iter(without.values()), "")
+            why = next(iter(left_out.values()), "")
             raise InputError(why or "CAMPAIGN: a lot has two sensors or more; `diagnose` takes one")
-        for name, why in without.items():
+        for name, why in left_out.items():
             say(f"not in the lot: {name}: {why.removeprefix(f'{name}: ')}")
         diagnosis = weigh_lot(usable, model, approach, seed, cores)
-        return cls(LotCalibration.of(diagnosis, model), without)
+        return cls(LotCalibration.of(diagnosis, model), left_out)
 
     @property
     def calibrations(self) -> dict[str, Calibration]:
@@ -137,8 +137,8 @@ class Lot(Result):
             either,
             closest=[either(names[:3]) for names in d.close],
             alternatives=[f"{either(names[:3])} ({probability(p)})" for names, p in d.alternatives],
-            alone=sum(one.p_value < LEVEL for one in d.evidence),
-            single=sum(max(one.odds, key=one.odds.__getitem__) in first for one in d.evidence),
+            tested_alone=sum(one.p_value < LEVEL for one in d.evidence),
+            named_alone=sum(max(one.odds, key=one.odds.__getitem__) in first for one in d.evidence),
             max_tilt=MAX_TILT_GON * GON,
         )
 

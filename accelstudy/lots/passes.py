@@ -65,7 +65,7 @@ class LotEffect(NamedTuple):
     specs : (n,) tuple of str, that of each sensor: what is sudden has a time of its own; empty of
         what is no effect
     having : (n,) array, posterior of each sensor to have it
-    apart : (n,) array, that of having it in another size than the others
+    other_size : (n,) array, that of having it in another size than the others
     parameters : its sizes, once the sensors are calibrated with it
     """
 
@@ -76,7 +76,7 @@ class LotEffect(NamedTuple):
     spec: str | None
     specs: tuple[str, ...]
     having: Array
-    apart: Array
+    other_size: Array
     parameters: Sequence[TypeParameter] = ()
 
     def is_one_of(self, effects: Sequence[LotEffect]) -> bool:
@@ -263,8 +263,8 @@ class Pass:
         first = names[0]
         members = tuple(member for name in names for member in self.classes[name])
         share, low, high = self.mixture.share(first)
-        apart, each = self.mixture.own_size(first), [one.specs for one in self.evidence]
-        having = self.mixture.effects[first].having + apart
+        other_size, each = self.mixture.own_size(first), [one.specs for one in self.evidence]
+        having = self.mixture.effects[first].having + other_size
         most = max(self.evidence, key=lambda one: one.odds.get(first, -np.inf))
         shown = self.shown.get(first)
         spec = most.specs.get(first) if shown is None else shown.spec
@@ -272,7 +272,9 @@ class Pass:
         if spec is not None:
             sudden = get_effect(spec).sudden
             own = tuple(specs.get(first, spec) if sudden else spec for specs in each)
-        return LotEffect(members, min(posterior, 1.0), share, (low, high), spec, own, having, apart)
+        return LotEffect(
+            members, min(posterior, 1.0), share, (low, high), spec, own, having, other_size
+        )
 
     @cached_property
     def _rare(self) -> set[str]:

@@ -200,8 +200,8 @@ class LotResiduals:
         """
         starts, none = [(x, effect.pooled / x) for x in SHARES], np.full_like(odd, -np.inf)
         # If sizes differ much, each sensor looks odd beside their mean.
-        without = [self._search(effect, none, max(SCATTERS), *start) for start in starts]
-        starts += [(one.share, one.mean) for one in without]
+        starting = [self._search(effect, none, max(SCATTERS), *start) for start in starts]
+        starts += [(one.share, one.mean) for one in starting]
         likelihood = attrgetter("log_likelihood")
         return [
             max((self._search(effect, odd, τ, *start) for start in starts), key=likelihood)
@@ -223,12 +223,12 @@ class LotResiduals:
         nothing, before = self.noise_density(self.squares)[0], -np.inf
         for _ in range(MAX_STEPS):
             variance = scatter**2 * float(np.mean(mean**2))
-            beside = np.eye(k) + variance * normal  # I + N S
-            spread = variance * np.linalg.inv(beside)  # (S⁻¹ + N)⁻¹
+            growth = np.eye(k) + variance * normal  # I + N S
+            spread = variance * np.linalg.inv(growth)  # (S⁻¹ + N)⁻¹
             rest = right - normal @ mean
             part = (right + rest) @ mean + np.einsum("nk,nkl,nl->n", rest, spread, rest)
             density, precision = self.noise_density(np.maximum(self.squares - part, 0.0))
-            odds = density - nothing - np.linalg.slogdet(beside)[1] / 2
+            odds = density - nothing - np.linalg.slogdet(growth)[1] / 2
             logs = np.array([np.full(len(odds), np.log1p(-share)), np.log(share) + odds, odd])
             total = np.logaddexp.reduce(logs)
             if (now := float(total.sum())) < before + LIKELIHOOD_TOLERANCE:
@@ -237,12 +237,12 @@ class LotResiduals:
             has = np.exp(logs - total)
             # Weighted least squares, with the noise that the effect leaves in each sensor.
             weights = np.maximum(has[1], LEAST_HAVING) * precision
-            taken = normal - normal @ spread @ normal  # (N⁻¹ + S)⁻¹
-            whole = np.einsum("n,nkl->kl", weights, taken)
-            pulled = right - np.einsum("nkl,nlm,nm->nk", normal, spread, right)
-            mean = _solved(whole, weights @ pulled)
+            information = normal - normal @ spread @ normal  # (N⁻¹ + S)⁻¹
+            pooled = np.einsum("n,nkl->kl", weights, information)
+            score = right - np.einsum("nkl,nlm,nm->nk", normal, spread, right)
+            mean = _solved(pooled, weights @ score)
             share = float(np.clip(has[1].sum() / max(has[:2].sum(), 1e-300), 0.01, 0.999))
-        return TypicalSize(odds, before, _cost_of_fitting(k, mean @ whole @ mean), mean, share)
+        return TypicalSize(odds, before, _cost_of_fitting(k, mean @ pooled @ mean), mean, share)
 
 
 def _solved(normal: Array, right: Array) -> Array:

@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from accelstudy.approaches import get_approach
-from accelstudy.basics.errors import InputError, UnknownNameError
+from accelstudy.basics.errors import InputError, check_name
 from accelstudy.basics.progress import begin, track
 from accelstudy.data_sheets import get_data_sheet, sheet_of_sigma
 from accelstudy.design.criteria import MINIMAX, get_criterion
@@ -48,8 +48,7 @@ def plan_for(**keywords: Any) -> Plan:
     by_hand = Equipment("gravity", keywords["moving_time"], 0.0)
     robot = Equipment("robot", keywords["robot_moving_time"], keywords["robot_setup_time"])
     equipment = {"gravity": (by_hand,), "robot": (robot,), "both": (by_hand, robot)}
-    if keywords["equipment"] not in equipment:
-        raise UnknownNameError("equipment", keywords["equipment"], equipment)
+    check_name("equipment", keywords["equipment"], equipment)
     if (sensor is None) == (sigma is None):
         both = ", not both" if sensor else ""
         raise InputError(f"plan: give the sensor by `sensor`, or its noise by `sigma`{both}")

@@ -23,10 +23,12 @@ class Conversion:
     ----------
     scale : (3,) array, one for each axis, or (1,), SI per unit of the raw numbers; not zero
     offset : array of the same shape, raw number that means zero
+    unit : str, of the raw numbers, for messages
     """
 
     scale: Array
     offset: Array
+    unit: str = "m/s^2"
 
     def axis(self, axis: int) -> Conversion:
         """Conversion of the numbers of one axis alone."""
@@ -70,13 +72,13 @@ def conversion_of(
         zero = _triple(0.0 if offset is None else offset, "offset")
         if not np.all(np.abs(zero) <= MAX_VALUE):
             raise InputError("offset: must be finite")
-        return Conversion(factor, zero)
+        return Conversion(factor, zero, unit)
     if scale is not None or offset is not None:
         raise InputError(f"a nominal scale or offset goes with unit counts, not {unit}")
     sizes = {name: UNITS["m/s^2"][name] for name in SENSOR_UNITS}
     if unit not in sizes:
         raise UnknownNameError("unit of a log", unit, (*sizes, "counts"))
-    return Conversion(np.full(3, sizes[unit]), np.zeros(3))
+    return Conversion(np.full(3, sizes[unit]), np.zeros(3), unit)
 
 
 def _triple(value: ArrayLike, name: str) -> Array:

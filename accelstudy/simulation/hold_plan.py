@@ -8,7 +8,7 @@ import numpy as np
 
 from accelstudy.basics import bounds
 from accelstudy.basics.arrays import Array
-from accelstudy.basics.errors import InputError, UnknownNameError
+from accelstudy.basics.errors import InputError, check_name
 from accelstudy.effects import Effect, HoldConditions
 from accelstudy.leveling.angles import roll_pitch
 from accelstudy.sensors.models import compose
@@ -46,8 +46,7 @@ class HoldPlan:
 
     def __post_init__(self) -> None:
         for key, choices in CHOICES.items():
-            if getattr(self, key) not in choices:
-                raise UnknownNameError(key, getattr(self, key), choices)
+            check_name(key, getattr(self, key), choices)
         if self.interval is not None:
             bounds.INTERVAL.check_key("interval", self.interval)
         for key, allowed in RANGES.items():

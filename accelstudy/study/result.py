@@ -16,7 +16,7 @@ from matplotlib.axes import Axes
 
 from accelstudy.approaches import get_approach
 from accelstudy.basics.arguments import as_sequence, check_type, quantity, tidy
-from accelstudy.basics.errors import InputError, UnknownNameError
+from accelstudy.basics.errors import InputError, check_name
 from accelstudy.basics.units import MGON, InputQuantity, display_unit, to_display
 from accelstudy.basics.wording import plural
 from accelstudy.drawing.style import FULL
@@ -278,8 +278,7 @@ def _with_truth(cells: Sequence[Cell], truth: Mapping[str, float | str] | None) 
     units = {p.name: p.unit for cell in cells for p in cell.simulated_model.parameters}
     values = {}
     for name, value in (truth or {}).items():
-        if name not in units:
-            raise UnknownNameError("parameter of the truth", name, units)
+        check_name("parameter of the truth", name, units)
         values[name] = quantity(f"truth: {name}", value, InputQuantity(units[name], -inf))
     return [
         replace(cell, truth={**cell.truth, **{k: v for k, v in values.items() if k in cell.truth}})

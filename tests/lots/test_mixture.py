@@ -9,7 +9,7 @@ from scipy import integrate, stats
 from accelstudy.diagnosis.evidence.size import SIZE_WEIGHTS, SIZES, Level, log_mean
 from accelstudy.effects import get_effect
 from accelstudy.lots.evidence import SensorEvidence, lot_classes
-from accelstudy.lots.lot import LotDiagnosis, _settled
+from accelstudy.lots.lot import LotDiagnosis, _settle
 from accelstudy.lots.mixture import PRIOR_ALIKE, PRIOR_ALL, PRIOR_MISSING, PRIOR_ODD, Mixture
 from accelstudy.lots.passes import LEVEL, MIN_CERTAIN, LotEffect, Pass
 from accelstudy.lots.sizes import SCATTERS, LotResiduals, TypicalSize
@@ -276,9 +276,9 @@ def test_what_imitates_two_effects_gives_way_beside_one_of_them():
     def beside(effects):
         return SimpleNamespace(found=found[sum((one.names for one in effects), ())])
 
-    assert _settled([imitator], beside) == [imitator]
-    assert _settled([imitator, second], beside) == [first, second]
-    assert _settled([first, second], beside) == [first, second]
+    assert _settle([imitator], beside) == [imitator]
+    assert _settle([imitator, second], beside) == [first, second]
+    assert _settle([first, second], beside) == [first, second]
 
 
 def test_names_that_no_campaign_tells_apart_are_one_class():

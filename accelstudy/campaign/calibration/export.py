@@ -7,7 +7,7 @@ from functools import partial
 
 import numpy as np
 
-from accelstudy.basics.errors import InputError, UnknownNameError
+from accelstudy.basics.errors import InputError, check_name
 from accelstudy.basics.wording import comma_list
 from accelstudy.campaign.calibration.c_code import c_header
 from accelstudy.campaign.calibration.px4 import px4_parameters
@@ -55,8 +55,7 @@ def export(calibration: SensorCalibration, form: str) -> tuple[str, list[str]]:
     UnknownNameError, InputError
         If there is no such form, or it cannot hold the calibration.
     """
-    if form not in FORMS:
-        raise UnknownNameError("form", form, FORMS)
+    check_name("form", form, FORMS)
     written = FORMS[form](calibration)
     text, lost = (written, []) if isinstance(written, str) else written
     mended = calibration.document.mended

@@ -141,7 +141,7 @@ class Leveling:
 
     def check(self) -> None:
         """Raise `InputError` if the log is not one of the sensor, or lacks what effects need."""
-        path, layout = self.log.path, self.log.layout
+        path = self.log.path
         for effect, condition in self.calibration.model.needs:
             if condition.startswith("step_") or getattr(self.hold, condition) is not None:
                 continue
@@ -156,7 +156,7 @@ class Leveling:
         if not len(usable):
             first = f"; the first: {self.reason(0)}" if len(self.forces) else ""
             raise InputError(f"{path}: no row has three numbers{first}")
-        check_size(f"{path}", usable, self.calibration.gravity, layout.unit, layout.conversion)
+        check_size(f"{path}", usable, self.calibration.gravity, self.log.layout.conversion)
 
     # --- the columns that are added --------------------------------------------------------------
 

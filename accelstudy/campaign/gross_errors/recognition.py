@@ -100,9 +100,7 @@ class Recognition:
         return np.linalg.multi_dot([*steps[::-1], np.eye(3)]) if steps else None
 
 
-def check_size(
-    where: str, forces: Array, gravity: float, unit: str, conversion: Conversion
-) -> list[str]:
+def check_size(where: str, forces: Array, gravity: float, conversion: Conversion) -> list[str]:
     """Check that forces, most of them at rest, are roughly as large as gravity.
 
     Even bad sensors are wrong by some tenths only, so a factor of two has another cause.
@@ -112,7 +110,7 @@ def check_size(
     where : str, begins the message
     forces : (n, 3) array, m/s²
     gravity : float, m/s²
-    unit, conversion : of the numbers that the forces were read from
+    conversion : of the numbers that the forces were read from
 
     Returns
     -------
@@ -128,7 +126,7 @@ def check_size(
     def near(size: float, gravity: float) -> bool:
         return gravity / 2 < size < gravity * 2
 
-    norm = usual_norm(forces)
+    unit, norm = conversion.unit, usual_norm(forces)
     what, share = f"the forces are about {norm:.3g} m/s²", norm / gravity - 1
     if near(norm, gravity):
         if abs(share) <= LARGEST["scale"]:
@@ -180,8 +178,8 @@ def check_plausible(campaign: Campaign, where: str, angle_unit: str = "gon") -> 
     InputError
         If a wrong unit or sign is recognised; it says what would be right.
     """
-    unit, conversion = campaign.header.unit, campaign.header.conversion("forces")
-    doubts = check_size(where, campaign.forces, campaign.gravity, unit, conversion)
+    conversion = campaign.header.conversion("forces")
+    doubts = check_size(where, campaign.forces, campaign.gravity, conversion)
     if campaign.angles is None:
         return doubts
     for error in _undo_everywhere(campaign, True, angle_unit).undone:
@@ -222,7 +220,7 @@ def recognise(campaign: Campaign, attitude: bool = True) -> Recognition | None:
     for alone in (rows, outliers):
         sensor = _undo(sensor, alone)
     where, si = f"{campaign.name}: fx, fy, fz", conversion_of("m/s^2")
-    check_size(where, sensor.campaign.forces, campaign.gravity, "m/s^2", si)
+    check_size(where, sensor.campaign.forces, campaign.gravity, si)
     return Recognition(sensor.undone) if sensor.undone else None
 
 

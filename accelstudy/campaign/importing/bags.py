@@ -120,8 +120,8 @@ def _rows(
 def _thermometer(reader: AnyReader, topic: str) -> list[Connection]:
     """The only topic of a temperature, or the only one beside the topic of the forces."""
     every = [c for c in reader.connections if c.msgtype == _TEMPERATURE]
-    beside = [c for c in every if c.topic.rpartition("/")[0] == topic.rpartition("/")[0]]
-    return next((some for some in (every, beside) if len({c.topic for c in some}) == 1), [])
+    siblings = [c for c in every if c.topic.rpartition("/")[0] == topic.rpartition("/")[0]]
+    return next((some for some in (every, siblings) if len({c.topic for c in some}) == 1), [])
 
 
 def read_ulog(path: Path, instance: str | None = None) -> RawTable:

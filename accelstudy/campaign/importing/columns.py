@@ -95,10 +95,10 @@ def resolve_layout(
     if {"time", "rate"} <= given.keys():
         raise InputError(f"{raw.path}: give the rate or the column of time, not both")
     another = like is None or like.columns.get("fx") not in raw.names
-    told = {**layout_by_names(raw.names), **raw.layout} if another else {}
+    inferred = {**layout_by_names(raw.names), **raw.layout} if another else {}
     if raw.frame is not None:
-        told |= raw.layout  # the times of its index
-    chosen = _overlaid(like, told, given)
+        inferred |= raw.layout  # the times of its index
+    chosen = _overlaid(like, inferred, given)
     columns = chosen.columns | ({} if chosen.time is None else {"time": chosen.time})
     known = (*AXES, *CONDITIONS, *more)
     wanted = known if chosen.rate is not None else (*AXES, "time", *CONDITIONS, *more)
@@ -114,7 +114,7 @@ def resolve_layout(
             "change them"
         ) from None
     if another:
-        chosen = _overlaid(like, {**_units(raw, places, given), **told}, given)
+        chosen = _overlaid(like, {**_units(raw, places, given), **inferred}, given)
     by_name = {
         key: raw.names[i] if raw.named and raw.names.count(raw.names[i]) == 1 else i
         for key, i in places.items()
@@ -126,7 +126,7 @@ def resolve_layout(
 
 
 def _overlaid(
-    like: LogLayout | None, told: Mapping[str, Any], given: Mapping[str, Any]
+    like: LogLayout | None, inferred: Mapping[str, Any], given: Mapping[str, Any]
 ) -> LogLayout:
     """Layout of another log overlaid with what a log tells and what is given of it.
 
@@ -134,7 +134,7 @@ def _overlaid(
     another one. A column of time replaces a rate, and a unit the scale of counts.
     """
     layout = {} if like is None else like.model_dump(exclude_none=True)
-    for layer in (told, given):
+    for layer in (inferred, given):
         replaced = {"time", "rate"} if layer.keys() & {"time", "rate"} else set()
         if layer.get("unit", "counts") != "counts":
             replaced |= {"scale", "offset"}

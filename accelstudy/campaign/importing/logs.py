@@ -182,8 +182,8 @@ def _campaign_of_means(log: Log, settings: ImportSettings) -> Campaign:
             f"the rows are {step / 3600:.3g} h apart on average; is `time_unit` "
             f"{log.layout.time_unit} right?"
         )
-    told = "unknown" if sigma is None else sigma_text(sigma)
-    notes = (_columns_note(log, settings), f"{len(rows)} positions; sigma of a mean: {told}")
+    shown = "unknown" if sigma is None else sigma_text(sigma)
+    notes = (_columns_note(log, settings), f"{len(rows)} positions; sigma of a mean: {shown}")
     campaign = Campaign.of(header, forces=log.forces, **columns)
     return _checked(replace(campaign, notes=notes, warnings=tuple(warnings)), log, settings)
 

@@ -10,7 +10,7 @@ from urllib.parse import unquote, urlsplit
 
 from pydantic import Field
 
-from accelstudy.basics.errors import InputError, UnknownNameError
+from accelstudy.basics.errors import InputError, check_name
 from accelstudy.campaign.importing.settings import ImportSettings
 from accelstudy.files.reading import read_layer
 from accelstudy.files.validation import ConfigSection, validate
@@ -114,6 +114,5 @@ def public_file(name: str, folder: str | Path) -> Path:
 
 def _public_data(name: str) -> PublicData:
     registry = public_data()
-    if name not in registry:
-        raise UnknownNameError("public data", name, registry)
+    check_name("public data", name, registry)
     return registry[name]

@@ -12,10 +12,10 @@ from dataclasses import dataclass, replace
 from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy import special
 
 from accelstudy.adjustment.quality import Solution
+from accelstudy.basics.arrays import Array
 from accelstudy.diagnosis.decision.posterior import Posterior
 from accelstudy.diagnosis.decision.problem import Problem
 from accelstudy.diagnosis.decision.refits import impossible, refit
@@ -30,8 +30,6 @@ from accelstudy.diagnosis.space.shapes import Place
 from accelstudy.effects import get_effect
 from accelstudy.effects.learned import ANGLES, LEARNED, OF_EACH, TARGETS, UNITS, LearnedFunction
 from accelstudy.effects.smooth import CYCLES, LENGTHS
-
-Array = NDArray[np.float64]
 
 SIZES = np.geomspace(4.0, 4e6, 61)
 """λ of which the most probable one gives the amplitude."""

@@ -24,9 +24,9 @@ from functools import cache
 from typing import TypeAlias
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.special import gammaln
 
+from accelstudy.basics.arrays import Array
 from accelstudy.diagnosis.evidence.bounds import within_bounds
 from accelstudy.diagnosis.evidence.candidates import Field
 from accelstudy.diagnosis.evidence.size import Evidence
@@ -34,7 +34,6 @@ from accelstudy.diagnosis.rules import RULES
 from accelstudy.diagnosis.space.hypotheses import OUTLIER, Hypotheses, Hypothesis, joint_basis
 from accelstudy.diagnosis.space.residuals import Residuals
 
-Array = NDArray[np.float64]
 Places = tuple[int, ...]
 """Numbers of candidates, ascending; that of the outlying positions may be there twice."""
 

@@ -22,9 +22,8 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy.special import gammaln
 
+from accelstudy.basics.arrays import Array
 from accelstudy.diagnosis.rules import RULES
-
-Array = NDArray[np.float64]
 
 SIZES = np.geomspace(4.0, 4e6, 13)
 SIZE_WEIGHTS = np.where(SIZES < 1500, 0.9 / 6, 0.1 / 7)
