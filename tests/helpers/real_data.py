@@ -13,6 +13,7 @@ from accelstudy.basics.units import shown_unit
 from accelstudy.basics.wording import amount, number, probability, words
 from accelstudy.campaign.importing.logs import import_log
 from accelstudy.campaign.importing.public import import_settings, public_data, public_file
+from accelstudy.diagnosis.evidence.noise import force_residuals
 from accelstudy.diagnosis.pipeline import diagnose
 from accelstudy.diagnosis.report.words import verdict_lines
 from accelstudy.diagnosis.result import CampaignDiagnosis
@@ -78,7 +79,8 @@ def row(name, variant=""):
     sigma = d.campaign.sigma_force
     shown = "" if sigma is None else number(1e3 * float(np.mean(sigma)))
     given = f"{shown}, {variant or 'Allan'}" if shown else UNKNOWN
-    size = probability(None if (test := d.base_fit.global_test) is None else test.p_value)
+    test = d.base_fit.global_test
+    size = probability(test and test.p_value)
     pattern = probability(d.problem.p_value if d.problem.field.names else None)
     said = f"`{d.verdict}`" + "".join(f": {words(f.name)}" for f in d.found)
     cells = (f"`{name}`", d.campaign.n_positions, d.base.redundancy, given, size, pattern, said)
@@ -156,11 +158,12 @@ def y_axis(d):
     """What the y axis of the Innalabs leaves."""
     y, residuals = d.campaign.forces[:, 1] / d.campaign.gravity, 1e3 * d.base.misclosures[:, 0]
     carried, down = np.abs(y) > 0.8, residuals[y < -0.95]
-    shares = next(test.values for test in d.noise_tests if test.name == "axis_noise")
+    squares = np.sum(force_residuals(d.problem.at(d.final).residuals) ** 2, axis=0)
+    shares = dict(zip("xyz", squares / squares.sum(), strict=True))
     rms = [number(float(np.sqrt(np.mean(residuals[r] ** 2)))) for r in (carried, ~carried)]
     return {
         "positions in which y carries more": str(np.count_nonzero(carried)),
         "rms in these": rms[0], "rms in the others": rms[1],
-        **{f"share of {axis}": number(each) for axis, each in zip("xyz", shares, strict=True)},
+        **{f"share of {axis}": number(each) for axis, each in shares.items()},
         "least at y down": number(down.min()), "largest at y down": number(down.max()),
     }  # fmt: skip
