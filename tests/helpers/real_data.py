@@ -44,7 +44,8 @@ def texts() -> Iterator[tuple[str, str]]:
         yield name, lines(verdict(name, sigma))
     innalabs = diagnosed("innalabs-49")
     numbers = {**nonlinearity(), **blocks(), **y_axis(innalabs)}
-    numbers["effects that no campaign shows"] = ", ".join(map(words, innalabs.frame.tested.invisible))
+    invisible = innalabs.frame.tested.invisible
+    numbers["effects that no campaign shows"] = ", ".join(map(words, invisible))
     yield "numbers", lines(f"{what}: {said}" for what, said in numbers.items())
 
 
