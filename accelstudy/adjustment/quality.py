@@ -62,8 +62,71 @@ NEAR_POLE = 0.1
 
 
 @dataclass(frozen=True)
-class Solution:
-    """One calibrated session, linearised at its solution; n positions of c conditions.
+class Linearisation:
+    """One session, linearised at some parameters; n positions of c conditions.
+
+    Attributes
+    ----------
+    variances : (n, o) array, diagonal of Q, (m/s²)² and rad²
+    jac_parameters : (n, c, u) array, A
+    jac_observations : (n, c, o) array, B
+    misclosures : (n, c) array, w = ψ(l + v, x) − B v, m/s²; of the raw readings
+    prior : (k, u) array and (k,) array, rows of unit weight of Ã and of e for what is known of
+        parameters directly: of those with a prior, and of observed gravity, which is the last
+    """
+
+    variances: Array
+    jac_parameters: Array
+    jac_observations: Array
+    misclosures: Array
+    prior: tuple[Array, Array]
+
+    @staticmethod
+    def at(problem: CalibrationProblem, x: Array, v: Array) -> Linearisation:
+        """Linearise a session at parameters (u,) and residuals (n, o)."""
+        at = problem.linearise(x[None], problem.observations + v)
+        b = np.moveaxis(at.jac_observations[:, :, 0], -1, 0)
+        root_weight, seen = np.sqrt(problem.weights), problem.weights > 0
+        return Linearisation(
+            variances=problem.cofactors,
+            jac_parameters=np.moveaxis(at.jac_parameters[:, :, 0], -1, 0),
+            jac_observations=b,
+            misclosures=at.psi[:, 0].T - np.einsum("nco,no->nc", b, v),
+            prior=(np.diag(root_weight)[seen], (root_weight * (x - problem.direct[0]))[seen]),
+        )
+
+    @cached_property
+    def whitening(self) -> Array:
+        """L of each position, (n, c, c), with B Q Bᵀ = L Lᵀ."""
+        b = self.jac_observations
+        return np.linalg.cholesky(np.einsum("nco,no,ndo->ncd", b, self.variances, b))
+
+    @cached_property
+    def design(self) -> Array:
+        """Ã, (n c + k, u)."""
+        a = np.linalg.solve(self.whitening, self.jac_parameters)
+        return np.concatenate([a.reshape(-1, a.shape[-1]), self.prior[0]])
+
+    @cached_property
+    def errors(self) -> Array:
+        """Misclosures e of unit weight, (n c + k,)."""
+        e = np.linalg.solve(self.whitening, self.misclosures[..., None])
+        return np.concatenate([e.ravel(), self.prior[1]])
+
+    @cached_property
+    def basis(self) -> Array:
+        """Orthonormal basis U of the columns of Ã, (n c + k, u); R = I − U Uᵀ."""
+        return column_basis(self.design)
+
+    @cached_property
+    def blocks(self) -> Array:
+        """R of each position, (n, c, c)."""
+        return diagonal_blocks(self.basis, *self.misclosures.shape)
+
+
+@dataclass(frozen=True)
+class Solution(Linearisation):
+    """One calibrated session, linearised at its solution.
 
     Attributes
     ----------
@@ -72,12 +135,6 @@ class Solution:
     gravity : float, m/s², estimated or fixed
     cofactors : (u, u) array, Q_xx
     residuals : (n, o) array, v, in m/s² and rad
-    variances : (n, o) array, diagonal of Q, (m/s²)² and rad²
-    jac_parameters : (n, c, u) array, A
-    jac_observations : (n, c, o) array, B
-    misclosures : (n, c) array, w = ψ(l + v, x) − B v, m/s²; of the raw readings
-    prior : (k, u) array and (k,) array, rows of unit weight of Ã and of e for what is known of
-        parameters directly: of those with a prior, and of observed gravity, which is the last
     omega : float, Ω
     redundancy : int, r
     iterations : int, that it took
@@ -90,11 +147,6 @@ class Solution:
     gravity: float
     cofactors: Array
     residuals: Array
-    variances: Array
-    jac_parameters: Array
-    jac_observations: Array
-    misclosures: Array
-    prior: tuple[Array, Array]
     omega: float
     redundancy: int
     iterations: int
@@ -161,33 +213,6 @@ class Solution:
         part, of_noise = self.prior[0] @ self.cofactors, noise.variance * self.cofactors
         return np.asarray(of_noise + (noise.of_prior - noise.variance) * part.T @ part)
 
-    @cached_property
-    def whitening(self) -> Array:
-        """L of each position, (n, c, c)."""
-        return whitening_of(self.jac_observations, self.variances)
-
-    @cached_property
-    def design(self) -> Array:
-        """Ã, (n c + k, u)."""
-        a = np.linalg.solve(self.whitening, self.jac_parameters)
-        return np.concatenate([a.reshape(-1, a.shape[-1]), self.prior[0]])
-
-    @cached_property
-    def errors(self) -> Array:
-        """Misclosures e of unit weight, (n c + k,)."""
-        e = np.linalg.solve(self.whitening, self.misclosures[..., None])
-        return np.concatenate([e.ravel(), self.prior[1]])
-
-    @cached_property
-    def basis(self) -> Array:
-        """Orthonormal basis U of the columns of Ã, (n c + k, u); R = I − U Uᵀ."""
-        return column_basis(self.design)
-
-    @cached_property
-    def blocks(self) -> Array:
-        """R of each position, (n, c, c)."""
-        return diagonal_blocks(self.basis, *self.misclosures.shape)
-
     @property
     def redundancy_numbers(self) -> Array:
         """Redundancy of each position, (n,), the trace of its R (Baarda 1968; Koch 1999).
@@ -246,11 +271,6 @@ def root_of(blocks: Array) -> tuple[Array, NDArray[np.int_]]:
     return vectors * scale[:, None], np.count_nonzero(seen, axis=1)
 
 
-def whitening_of(b: Array, variances: Array) -> Array:
-    """L of each position, (n, c, c), with B Q Bᵀ = L Lᵀ; B (n, c, o), variances (n, o)."""
-    return np.linalg.cholesky(np.einsum("nco,no,ndo->ncd", b, variances, b))
-
-
 def solve(
     model: SensorModel,
     approach: Approach,
@@ -279,11 +299,8 @@ def solve(
     problem = CalibrationProblem.of(model, approach, observed)
     x, v = result.parameters[0], result.residuals[0]
     gravity = float(x[-1]) if problem.with_gravity else float(np.ravel(observed.gravity)[0])
-    at = problem.linearise(x[None], problem.observations + v)
-    b = np.moveaxis(at.jac_observations[:, :, 0], -1, 0)
-    root_weight = np.sqrt(problem.weights)
-    seen = problem.weights > 0
     return Solution(
+        **vars(Linearisation.at(problem, x, v)),
         model=model,
         approach=approach,
         observed=observed,
@@ -291,11 +308,6 @@ def solve(
         gravity=gravity,
         cofactors=result.cofactors[0],
         residuals=v,
-        variances=problem.cofactors,
-        jac_parameters=np.moveaxis(at.jac_parameters[:, :, 0], -1, 0),
-        jac_observations=b,
-        misclosures=at.psi[:, 0].T - np.einsum("nco,no->nc", b, v),
-        prior=(np.diag(root_weight)[seen], (root_weight * (x - problem.direct[0]))[seen]),
         omega=float(result.omega[0]),
         redundancy=result.redundancy,
         iterations=int(result.iterations[0]),

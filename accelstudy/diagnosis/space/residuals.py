@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 
 from accelstudy.adjustment import Observations
 from accelstudy.adjustment.calibration import CalibrationProblem
-from accelstudy.adjustment.quality import Solution, column_basis, diagonal_blocks, whitening_of
+from accelstudy.adjustment.quality import Linearisation, Solution, column_basis, diagonal_blocks
 from accelstudy.approaches import Approach
 from accelstudy.basics.arrays import Array
 from accelstudy.leveling.angles import angles_of, specific_force
@@ -61,8 +61,8 @@ class Residuals:
     sigmas: Array
 
     @classmethod
-    def of(cls, solution: Solution) -> Residuals:
-        """Residual space of a calibration at its solution."""
+    def of(cls, solution: Linearisation) -> Residuals:
+        """Residual space of a session that is linearised, as a calibration is at its solution."""
         return cls(
             solution.design,
             solution.errors,
@@ -90,16 +90,8 @@ class Residuals:
         """
         problem = CalibrationProblem.of(model, approach, replace(observed, initial=None))
         x = problem.initial[0] if parameters is None else parameters
-        at = problem.linearise(x[None], problem.observations)
-        b = np.moveaxis(at.jac_observations[:, :, 0], -1, 0)
-        taken = problem.cofactors if variances is None else variances
-        whitening, seen = whitening_of(b, taken), problem.weights > 0
-        a = np.linalg.solve(whitening, np.moveaxis(at.jac_parameters[:, :, 0], -1, 0))
-        e = np.linalg.solve(whitening, at.psi[:, 0].T[..., None])
-        root = np.sqrt(problem.weights)
-        design = np.concatenate([a.reshape(-1, a.shape[-1]), np.diag(root)[seen]])
-        errors = np.concatenate([e.ravel(), (root * (x - problem.direct[0]))[seen]])
-        return cls(design, errors, whitening, b, np.sqrt(taken))
+        at = Linearisation.at(problem, x, np.zeros_like(problem.observations[0]))
+        return cls.of(at if variances is None else replace(at, variances=variances))
 
     @cached_property
     def absorbed(self) -> Array:
