@@ -28,9 +28,9 @@ MAX_NORM_RATIO = 1.5
 MIN_SPREAD = 0.25
 """Rms of the means along their thinnest direction, over gravity; of a sphere 0.58."""
 MAX_OVER_HARMONIC = 1.4
-"""Length of a typical hold over the harmonic mean of all lengths, at most. If a third of 18 holds has
-a twelfth of the usual length, a test at 1 % then rejects 11 % of right calibrations by gravity, and
-79 % without this limit."""
+"""Length of a typical hold over the harmonic mean of all lengths, at most. If a third of 18 holds
+has a twelfth of the usual length, a test at 1 % then rejects 11 % of right calibrations by gravity,
+and 79 % without this limit."""
 LONGEST_RECORD = 2**20
 """Samples of a hold that are used for the Allan deviation; later ones count for the mean only."""
 MAX_READINGS = 2**15
