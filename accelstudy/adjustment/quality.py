@@ -124,6 +124,13 @@ class Linearisation:
         return diagonal_blocks(self.basis, *self.misclosures.shape)
 
 
+class PositionSquares(NamedTuple):
+    """Sum of squares Ω of the positions, and their redundancy r."""
+
+    omega: float
+    redundancy: float
+
+
 @dataclass(frozen=True)
 class Solution(Linearisation):
     """One calibrated session, linearised at its solution.
@@ -157,7 +164,7 @@ class Solution(Linearisation):
         return float(np.mean(np.asarray(self.observed.sigma_force)))
 
     @cached_property
-    def noise(self) -> tuple[float, float]:
+    def of_positions(self) -> PositionSquares:
         """Parts of Ω and r that tell of the noise: those of the positions.
 
         The rest is that of gravity and of priors, whose sigmas do not depend on the noise.
@@ -165,13 +172,13 @@ class Solution(Linearisation):
         rows, errors = self.prior
         known = float(len(rows) - np.sum(self.basis[len(self.basis) - len(rows) :] ** 2))
         if known < MIN_REDUNDANCY:  # as of gravity, which no position checks
-            return self.omega, self.redundancy
-        return self.omega - float(errors @ errors), self.redundancy - known
+            return PositionSquares(self.omega, self.redundancy)
+        return PositionSquares(self.omega - float(errors @ errors), self.redundancy - known)
 
     @property
     def variance_posteriori(self) -> float:
         """Variance of unit weight a posteriori σ̂0² = Ω/r of the positions; NaN if r is below 1."""
-        return _variance(*self.noise)
+        return _variance(*self.of_positions)
 
     @property
     def sigma_posteriori(self) -> float:
@@ -181,7 +188,7 @@ class Solution(Linearisation):
     @property
     def global_test(self) -> GlobalTest | None:
         """Test of the whole model against the stated noise; None without redundancy."""
-        share = self.noise[1] / self.redundancy if self.redundancy > 0 else 1.0
+        share = self.of_positions.redundancy / self.redundancy if self.redundancy > 0 else 1.0
         return global_test(self.omega, self.redundancy, sigma_dof=self.sigma_dof / share**2)
 
     def judge_noise(self, stated: bool) -> NoiseJudgement:
@@ -196,7 +203,7 @@ class Solution(Linearisation):
         ----------
         stated : bool, whether the noise was stated, and not taken from the residuals
         """
-        test, dof, (omega, r) = self.global_test, self.sigma_dof, self.noise
+        test, dof, (omega, r) = self.global_test, self.sigma_dof, self.of_positions
         if not stated:
             return NoiseJudgement(False, self.variance_posteriori)
         if test is not None and not test.accepted:
@@ -229,9 +236,10 @@ class Solution(Linearisation):
         forces have in r.
         """
         dof, angles = self.observed.sigma_dof, self.variances.shape[1] > 3
-        if not (angles and np.isfinite(dof) and self.noise[1] > MIN_REDUNDANCY):
+        r = self.of_positions.redundancy
+        if not (angles and np.isfinite(dof) and r > MIN_REDUNDANCY):
             return dof
-        return float(dof / (self.shares[:, :3].sum() / self.noise[1]) ** 2)
+        return float(dof / (self.shares[:, :3].sum() / r) ** 2)
 
     @cached_property
     def shares(self) -> Array:
@@ -450,7 +458,7 @@ def position_tests(solution: Solution) -> PositionTests:
     e = solution.errors[: n * c].reshape(n, c)
     normalised = np.einsum("ncd,nc->nd", root, e)
     statistic = np.sum(normalised**2, axis=1)
-    omega, r = solution.noise
+    omega, r = solution.of_positions
     with np.errstate(divide="ignore", invalid="ignore"):
         free = np.where(r - q > MIN_REDUNDANCY, r - q, np.nan)
         studentised = statistic / q / (np.maximum(omega - statistic, 0.0) / free)

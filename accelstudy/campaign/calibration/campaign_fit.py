@@ -106,7 +106,7 @@ class CampaignFit:
     @property
     def dof(self) -> float:
         """Degrees of freedom of the noise that is quoted; infinite where it is known."""
-        _, r = self.solution.noise
+        r = self.solution.of_positions.redundancy
         if self.noise.trusted:
             return self.solution.sigma_dof + r
         return r if r >= 1 else self.solution.redundancy
