@@ -156,7 +156,7 @@ def apply(
     unit : str
         Unit of the readings: m/s^2, g, mg or counts.
     frame : str
-        Where x, y, z point: frd, flu, rfu …
+        Where x, y, z point: frd, flu, rfu … [default: that of the calibration]
     start : float in s, or str with a unit
         Seconds from the start of the calibration session to the first row. [default: 0]
     sigma : float in m/s², or str with a unit
