@@ -29,6 +29,7 @@ from accelstudy.adjustment.calibration import CalibrationProblem, calibrate
 from accelstudy.adjustment.gauss_helmert import Adjustment
 from accelstudy.adjustment.observations import Observations
 from accelstudy.approaches import Approach
+from accelstudy.basics.arrays import Array
 from accelstudy.basics.errors import InputError
 from accelstudy.basics.levels import MAX_TILT_GON, REFUTATION_LEVEL
 from accelstudy.basics.units import GON
@@ -37,8 +38,6 @@ from accelstudy.effects.hold_conditions import REFERENCE_TEMPERATURE
 from accelstudy.leveling.angles import angles_of, roll_pitch, tilt_slope, wrap_angle
 from accelstudy.leveling.error import cap_forces
 from accelstudy.sensors.sensor import SensorModel
-
-Array = NDArray[np.float64]
 
 MIN_REDUNDANCY = 1e-6
 """A direction of a position with a smaller redundancy is not checked by the other positions."""
@@ -124,11 +123,20 @@ class Linearisation:
         return diagonal_blocks(self.basis, *self.misclosures.shape)
 
 
-class PositionSquares(NamedTuple):
-    """Sum of squares Ω of the positions, and their redundancy r."""
+class Squares(NamedTuple):
+    """Sum of squares Ω of some observations, and their redundancy r."""
 
     omega: float
     redundancy: float
+
+    @property
+    def has_variance(self) -> bool:
+        """Whether there is a redundancy of 1, the least that tells a variance."""
+        return self.redundancy > 1 - MIN_REDUNDANCY
+
+    def variance(self, otherwise: float = np.nan) -> float:
+        """Variance of unit weight Ω/r, or another one where the redundancy is not enough."""
+        return self.omega / self.redundancy if self.has_variance else otherwise
 
 
 @dataclass(frozen=True)
@@ -164,7 +172,7 @@ class Solution(Linearisation):
         return float(np.mean(np.asarray(self.observed.sigma_force)))
 
     @cached_property
-    def of_positions(self) -> PositionSquares:
+    def of_positions(self) -> Squares:
         """Parts of Ω and r that tell of the noise: those of the positions.
 
         The rest is that of gravity and of priors, whose sigmas do not depend on the noise.
@@ -172,13 +180,13 @@ class Solution(Linearisation):
         rows, errors = self.prior
         known = float(len(rows) - np.sum(self.basis[len(self.basis) - len(rows) :] ** 2))
         if known < MIN_REDUNDANCY:  # as of gravity, which no position checks
-            return PositionSquares(self.omega, self.redundancy)
-        return PositionSquares(self.omega - float(errors @ errors), self.redundancy - known)
+            return Squares(self.omega, self.redundancy)
+        return Squares(self.omega - float(errors @ errors), self.redundancy - known)
 
     @property
     def variance_posteriori(self) -> float:
         """Variance of unit weight a posteriori σ̂0² = Ω/r of the positions; NaN if r is below 1."""
-        return _variance(*self.of_positions)
+        return self.of_positions.variance()
 
     @property
     def sigma_posteriori(self) -> float:
@@ -207,8 +215,8 @@ class Solution(Linearisation):
         if not stated:
             return NoiseJudgement(False, self.variance_posteriori)
         if test is not None and not test.accepted:
-            of_prior = _variance(self.omega - omega, self.redundancy - r, 1.0)
-            return NoiseJudgement(False, _variance(omega, r, 1.0), max(of_prior, 1.0))
+            of_prior = Squares(self.omega - omega, self.redundancy - r).variance(1.0)
+            return NoiseJudgement(False, self.of_positions.variance(1.0), max(of_prior, 1.0))
         return NoiseJudgement(True, (dof + omega) / (dof + r) if np.isfinite(dof) else 1.0)
 
     def covariance(self, noise: NoiseJudgement) -> Array:
@@ -253,11 +261,6 @@ class Solution(Linearisation):
     def root(self) -> tuple[Array, NDArray[np.int_]]:
         """H (n, c, c) with H Hᵀ = R⁺ of each position, and the rank of R, (n,)."""
         return root_of(self.blocks)
-
-
-def _variance(omega: float, r: float, unknown: float = np.nan) -> float:
-    """Variance of unit weight Ω/r; `unknown` where r is below 1."""
-    return omega / r if r > 1 - MIN_REDUNDANCY else unknown
 
 
 def column_basis(design: Array) -> Array:

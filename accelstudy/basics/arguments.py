@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import Any
 
 from accelstudy.basics.bounds import Range
-from accelstudy.basics.errors import InputError, at, brief
+from accelstudy.basics.errors import InputError, brief, locate_errors
 from accelstudy.basics.names import check_file_name
 from accelstudy.basics.units import InputQuantity
 
@@ -44,7 +44,7 @@ def quantity(name: str, value: Any, kind: InputQuantity) -> float:
     if not isinstance(value, bool) and isinstance(value, Real) and isfinite(value):
         value = f"{float(value)!r} {kind.unit}"  # the unit may begin with a digit, as 1/K does
     check_type(name, value, str, expected=f"a number in {kind.unit} or a text with its unit")
-    with at(name):
+    with locate_errors(name):
         return kind.read(value)
 
 

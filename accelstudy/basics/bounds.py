@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from accelstudy.basics.errors import InputError, at
+from accelstudy.basics.errors import InputError, locate_errors
 
 
 @dataclass(frozen=True)
@@ -37,7 +37,7 @@ class Range:
 
     def check_key(self, key: str, value: float) -> None:
         """Check the value of a key, which the error names."""
-        with at(key):
+        with locate_errors(key):
             self.check(value)
 
 

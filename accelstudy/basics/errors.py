@@ -41,7 +41,7 @@ class InputError(ValueError):
 
 
 @contextmanager
-def at(place: object) -> Iterator[None]:
+def locate_errors(place: object) -> Iterator[None]:
     """Begin the message of an `InputError` within a ``with`` block with the place of the error."""
     try:
         yield

@@ -21,7 +21,7 @@ from pathlib import Path
 from types import ModuleType
 from typing import Any
 
-from accelstudy.basics.errors import InputError, at, reason_of
+from accelstudy.basics.errors import InputError, locate_errors, reason_of
 from accelstudy.basics.names import check_file_name
 
 PREFIX = "accelstudy."
@@ -66,7 +66,7 @@ def load_files(paths: Iterable[str | Path]) -> None:
 
 def load_plugins(content: Mapping[str, Any]) -> None:
     """Load the plug-ins that a configuration names; raises errors like `load_files`."""
-    with at("plugins"):
+    with locate_errors("plugins"):
         load_files(_plugin_names(content))
 
 

@@ -13,7 +13,7 @@ import pandas as pd
 from numpy.typing import NDArray
 
 from accelstudy.basics.arrays import Array
-from accelstudy.basics.errors import InputError, at, brief, did_you_mean
+from accelstudy.basics.errors import InputError, brief, did_you_mean, locate_errors
 from accelstudy.basics.wording import one_line, short_list
 from accelstudy.campaign.columns import COLUMNS, KEYS, Columns, table_of
 from accelstudy.campaign.gross_errors.recognition import check_plausible
@@ -161,7 +161,7 @@ def _parse(columns: Table, header: Header, path: Path, plausible: bool = True) -
     campaign = Campaign(header.model_copy(update={"excluded": None}), table_of(arrays))
     if plausible:
         check_plausible(campaign, f"{path.with_name(HEADER)} and {path.name}")
-    with at(path.with_name(HEADER)):
+    with locate_errors(path.with_name(HEADER)):
         return campaign.without(reasons)
 
 

@@ -13,7 +13,7 @@ from typing import Any
 from pydantic import ConfigDict
 
 from accelstudy.basics.arguments import quantity
-from accelstudy.basics.errors import InputError, UnknownNameError, at
+from accelstudy.basics.errors import InputError, UnknownNameError, locate_errors
 from accelstudy.basics.plugins import error_as_line, installed_entry_points, label
 from accelstudy.campaign.sensor_type import TYPE_KEYS
 from accelstudy.data_sheets.sheet import QUANTITIES, DataSheet
@@ -95,7 +95,7 @@ def parse_data_sheet(content: Mapping[str, Any], source: str = "data sheet") -> 
     quantities = {**QUANTITIES, DENSITY: QUANTITIES[WALK]}
     values: dict[str, Any] = {"name": Path(source).stem}
     sources: dict[str, str] = {}
-    with at(source):
+    with locate_errors(source):
         for key in [key for key in content if key not in TYPE_KEYS]:
             entry = content[key]
             if key in quantities:

@@ -112,7 +112,7 @@ class CampaignDiagnosis:
         return CampaignFit(self.campaign, self.base)
 
     @cached_property
-    def calibrated(self) -> CampaignFit:
+    def final_fit(self) -> CampaignFit:
         """The calibration with what was found, without positions that were found to be bumped."""
         bumped = self.campaign.positions[~self.used_positions].tolist()
         reasons = dict.fromkeys(bumped, "bumped, as the diagnosis found")
@@ -247,8 +247,8 @@ class CampaignDiagnosis:
         return variances
 
     @property
-    def unit(self) -> float:
-        """Variance of the noise in these units: as stated or, if none is, of what is left."""
+    def noise_variance(self) -> float:
+        """Variance of the noise by that of the base fit: 1 if stated, else that of the last fit."""
         return 1.0 if self.sigma_known else [*self.variances.values()][-1]
 
     @property
@@ -258,7 +258,7 @@ class CampaignDiagnosis:
         for model, variance in self.variances.items():
             fit = self.base if model == "base" else self.final.solution
             dof = min(fit.sigma_dof, 1e9)
-            r, measured = fit.redundancy, variance / self.unit
+            r, measured = fit.redundancy, variance / self.noise_variance
             usual = special.fdtri(r, dof, [0.025, 0.975]).tolist()
             sizes.append(Fit(model=model, redundancy=r, simulated=usual, measured=measured))
         return sizes
@@ -360,5 +360,5 @@ class CampaignDiagnosis:
     @cached_property
     def implausible(self) -> list[str]:
         """Parameters of the final fit that no sensor has."""
-        fit = self.calibrated
+        fit = self.final_fit
         return implausible_parameters(fit.model.effects, fit.parameters, fit.sigma)

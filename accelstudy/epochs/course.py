@@ -77,6 +77,11 @@ class ParameterCourse:
             at = np.log(np.diff(self.years) / span)
         return np.array([model.log_evidence() for model in self._steps]) + at - line
 
+    @property
+    def _best_step(self) -> RandomEffects:
+        """The step that explains most."""
+        return self._steps[int(np.argmax(self._step_evidence))]
+
     @cached_property
     def step(self) -> Step | None:
         """The step that explains most, and how probable a step is; None of few calibrations."""
@@ -84,10 +89,9 @@ class ParameterCourse:
             return None
         shares, order = special.softmax(self._step_evidence), np.argsort(-self._step_evidence)
         likely = order[: np.searchsorted(np.cumsum(shares[order]), SURE) + 1]
-        best = self._steps[order[0]]
         return Step(
-            size=best.estimates[1],
-            sigma=np.sqrt(best.covariance[1, 1]),
+            size=self._best_step.estimates[1],
+            sigma=np.sqrt(self._best_step.covariance[1, 1]),
             after=likely.min() + 1,
             before=likely.max() + 2,
             probability=special.expit(special.logsumexp(self._step_evidence)),
@@ -98,8 +102,7 @@ class ParameterCourse:
         """Value at the time 0, rate per year, and the size of a step where one is sure."""
         if not self._is_step:
             return self._level_and(self.years)
-        step = self._steps[int(np.argmax(self._step_evidence))].design[:, 1]
-        return self._level_and(self.years, step)
+        return self._level_and(self.years, self._best_step.design[:, 1])
 
     @property
     def _is_step(self) -> bool:

@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 
 from accelstudy.basics.arrays import Array
 from accelstudy.basics.dates import read_date
-from accelstudy.basics.errors import InputError, at, key
+from accelstudy.basics.errors import InputError, key, locate_errors
 from accelstudy.basics.units import GON, MGON, shown_unit, to_display
 from accelstudy.basics.wording import comma_list, estimate, plural
 from accelstudy.campaign.calibration.sensor_calibration import SensorCalibration
@@ -396,7 +396,7 @@ def dates_of(
                 f"{name}: date: missing; give `dates` for each calibration, or calibrate "
                 "again with `date` in the header of the campaign"
             )
-        with at(key("dates") if dates else f"{name}: date"):
+        with locate_errors(key("dates") if dates else f"{name}: date"):
             stated.append(read_date(date))
     return stated
 

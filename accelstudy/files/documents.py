@@ -13,10 +13,10 @@ from pydantic import ConfigDict
 
 from accelstudy.files.outputs import write_text
 from accelstudy.files.reading import read_json
-from accelstudy.files.validation import Described, Number, validate
+from accelstudy.files.validation import DocumentedModel, Number, validate
 
 
-class Part(Described):
+class Part(DocumentedModel):
     """A part of a document; keys of later versions are kept as they are.
 
     It is made of a mapping, or of an object with these attributes.

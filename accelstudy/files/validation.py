@@ -151,7 +151,7 @@ class KeyProblem(ValueError):
     """What is wrong with a key of a section, which the message begins with."""
 
 
-class Described(BaseModel):
+class DocumentedModel(BaseModel):
     """A model whose docstring says what its keys mean, on pages and in the JSON Schema."""
 
     @classmethod
@@ -160,7 +160,7 @@ class Described(BaseModel):
     ) -> dict[str, Any]:
         """JSON Schema with the head of the docstring, and the meaning of each key."""
         schema = handler.resolve_ref_schema(handler(core))
-        for one in reversed(cls.__mro__[: cls.__mro__.index(Described)]):
+        for one in reversed(cls.__mro__[: cls.__mro__.index(DocumentedModel)]):
             text, _, attributes = inspect.cleandoc(one.__doc__ or "").partition("\n\nAttributes\n")
             schema["description"] = text
             for name, meaning in ITEM.findall(attributes):
@@ -169,7 +169,7 @@ class Described(BaseModel):
         return schema
 
 
-class ConfigSection(Described):
+class ConfigSection(DocumentedModel):
     """A part of the configuration; unknown keys are errors."""
 
     model_config = ConfigDict(extra="forbid", frozen=True, strict=False)

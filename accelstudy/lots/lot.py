@@ -41,7 +41,7 @@ from accelstudy.lots.passes import (
 from accelstudy.sensors.models import compose, composition_name
 from accelstudy.sensors.sensor import SensorModel
 
-WeighWith: TypeAlias = Callable[[Sequence[LotEffect]], Pass]
+Weighing: TypeAlias = Callable[[Sequence[LotEffect]], Pass]
 """Weighs all sensors with some effects in their models."""
 
 LEVEL_OF_REST = 0.01
@@ -206,7 +206,7 @@ def weigh_lot(
     return LotDiagnosis(tuple(passes), model, close=close, explained=False)
 
 
-def _settle(effects: Sequence[LotEffect], weigh_with: WeighWith) -> list[LotEffect]:
+def _settle(effects: Sequence[LotEffect], weigh_with: Weighing) -> list[LotEffect]:
     """Effects, each as it is found beside the others, as the last one was.
 
     One effect may imitate the sum of two: beside the second one the first one shows what it is.
@@ -222,7 +222,7 @@ def _settle(effects: Sequence[LotEffect], weigh_with: WeighWith) -> list[LotEffe
     return settled
 
 
-def _explained(now: Pass, effects: Sequence[LotEffect], weigh_with: WeighWith) -> bool:
+def _explained(now: Pass, effects: Sequence[LotEffect], weigh_with: Weighing) -> bool:
     """Whether what was found explains the lot, with the most probable of what is not sure."""
     effects = list(effects)
     while now.p_value_of_usual < LEVEL_OF_REST:

@@ -13,7 +13,7 @@ from collections.abc import Mapping, Sequence
 from functools import cache
 from typing import Any
 
-from accelstudy.basics.errors import InputError, UnknownNameError, at
+from accelstudy.basics.errors import InputError, UnknownNameError, locate_errors
 from accelstudy.basics.plugins import HOW, explain_missing
 from accelstudy.effects import Effect, effect_names, get_effect, is_effect
 from accelstudy.files.reading import read_layer
@@ -145,5 +145,5 @@ def _model_of_file(path: str, name: str | None) -> SensorModel:
     effects = [effects] if isinstance(effects, str) else effects
     if not isinstance(effects, list) or not effects or not all(isinstance(e, str) for e in effects):
         raise InputError(f"{path}: {key}: must be a list of effects")
-    with explain_missing(content, path), at(f"{path}: {key}"):
+    with explain_missing(content, path), locate_errors(f"{path}: {key}"):
         return _composed(effects, str(name or key.removeprefix("models.")))

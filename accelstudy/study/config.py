@@ -29,7 +29,7 @@ from pydantic_core import core_schema
 
 from accelstudy.approaches import Approach, approach_names, get_approach
 from accelstudy.basics import bounds
-from accelstudy.basics.errors import InputError, at, brief
+from accelstudy.basics.errors import InputError, brief, locate_errors
 from accelstudy.basics.levels import MAX_TILT_GON
 from accelstudy.basics.names import MAX_NAME_BYTES
 from accelstudy.basics.units import GON, MGON, STANDARD_GRAVITY, to_si
@@ -79,7 +79,7 @@ def parse_study(content: Mapping[str, Any], source: str = "config") -> Study:
         One line that names the source, the key, what is wrong and what would be right.
     """
     study = validate(Study, content, source)
-    with at(source):
+    with locate_errors(source):
         study.check()
     return study
 
@@ -507,7 +507,7 @@ class Study(Configuration):
             One line that names the key, what is wrong and what would be right.
         """
         for name, quantity in self.sensor.items():
-            with at(f"sensor.{name}"):
+            with locate_errors(f"sensor.{name}"):
                 quantity.in_si(get_effect(name))
         simulated = self.simulated_effects.effects if self.simulated_effects else ()
         models = [model for grid in self.grids for model in grid.models]

@@ -186,7 +186,7 @@ SHARE_OR_RMS = Kind(_share_or_rms, "share")
 File = Annotated[str | PathLike[str], PATH]
 Accuracy = Annotated[Quantity, angle(1e-9, math.pi / 2)]
 Tilt = Annotated[Quantity, angle(1e-3, math.pi / 2)]
-MAX_TILT = f"{MAX_TILT_GON:g}gon"
+TILT_RANGE = f"{MAX_TILT_GON:g}gon"
 Share = Annotated[Quantity, SHARE]
 Gravity = Annotated[Quantity, si("m/s^2", bounds.GRAVITY.least, bounds.GRAVITY.most)]
 

@@ -25,7 +25,7 @@ def compare(
     first: Calibration | str | PathLike[str],
     second: Calibration | str | PathLike[str],
     *,
-    tilt_range: kinds.Tilt = kinds.MAX_TILT,
+    tilt_range: kinds.Tilt = kinds.TILT_RANGE,
 ) -> History:
     """Say whether a sensor is still what it was.
 
@@ -70,7 +70,7 @@ def history(
     *,
     dates: Sequence[Annotated[str | date, kinds.DATE]] = (),
     tilt_accuracy: kinds.Accuracy | None = None,
-    tilt_range: kinds.Tilt = kinds.MAX_TILT,
+    tilt_range: kinds.Tilt = kinds.TILT_RANGE,
     confidence: kinds.Share = "95%",
 ) -> History:
     """Say how a sensor changes over time.

@@ -7,11 +7,11 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-from numpy.typing import NDArray
 
 from accelstudy.adjustment import quality
 from accelstudy.adjustment.components import VarianceComponents, variance_components
 from accelstudy.approaches import Approach
+from accelstudy.basics.arrays import Array
 from accelstudy.basics.levels import ACCEPTED, IMPLAUSIBLE, MAX_TILT_GON, REJECTED, UNCHECKED
 from accelstudy.basics.shares import sigmas_95
 from accelstudy.basics.units import GON
@@ -21,8 +21,6 @@ from accelstudy.leveling.angles import tilt_by_output, tilt_slope
 from accelstudy.leveling.error import ATTITUDES, cap_forces, holds_in_use
 from accelstudy.sensors.plausibility import implausible_parameters, implausible_tilt
 from accelstudy.sensors.sensor import SensorModel
-
-Array = NDArray[np.float64]
 
 OUTLIER_LEVEL = 0.05
 """Family-wise level of the tests of single positions."""
@@ -106,10 +104,10 @@ class CampaignFit:
     @property
     def dof(self) -> float:
         """Degrees of freedom of the noise that is quoted; infinite where it is known."""
-        r = self.solution.of_positions.redundancy
+        squares = self.solution.of_positions
         if self.noise.trusted:
-            return self.solution.sigma_dof + r
-        return r if r >= 1 else self.solution.redundancy
+            return self.solution.sigma_dof + squares.redundancy
+        return squares.redundancy if squares.has_variance else self.solution.redundancy
 
     @property
     def is_noise_known(self) -> bool:

@@ -6,12 +6,12 @@ from dataclasses import replace
 from functools import partial
 
 import numpy as np
-from numpy.typing import NDArray
 
 from accelstudy.adjustment import Observations, calibrate
 from accelstudy.adjustment.observations import AngleErrors
 from accelstudy.adjustment.quality import solve
 from accelstudy.approaches import Approach, get_approach
+from accelstudy.basics.arrays import Array
 from accelstudy.basics.errors import InputError
 from accelstudy.basics.units import MGON
 from accelstudy.basics.wording import words
@@ -25,8 +25,6 @@ from accelstudy.schemes import Scheme
 from accelstudy.sensors.models import compose
 from accelstudy.sensors.sensor import SensorModel, not_affine
 from accelstudy.simulation.sessions import Noise
-
-Array = NDArray[np.float64]
 
 MIN_SIGMA_RATIO = 1e-6
 """Smallest ratio of the noise of a direction to that of the robot's angles that double precision

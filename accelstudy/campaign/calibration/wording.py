@@ -36,7 +36,7 @@ def parameter_lines(content: Mapping[str, Any]) -> list[str]:
 
 
 def sentences(fit: CampaignFit, part: str = "verdict") -> list[str]:
-    """Say something of a calibration, a sentence each.
+    """Return the sentences of one part of what is said of a calibration.
 
     Parameters
     ----------

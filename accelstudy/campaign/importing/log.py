@@ -72,6 +72,7 @@ class Log:
         tells it; fx, fy, fz, m/s², in forward, right, down; and the conditions, such as
         temperature, °C
     start : float, s, first time in the file; NaN without a column of time
+    wrap : int, row at which its clock first began anew, and was counted on; None if it did not
     parts : tuple of Log, of which this one is joined; see `join`
     """
 
@@ -81,6 +82,7 @@ class Log:
     places: Mapping[str, int]
     samples: pd.DataFrame
     start: float
+    wrap: int | None = None
     parts: tuple[Log, ...] = ()
 
     @property
@@ -160,7 +162,10 @@ class Log:
         """What could not be read."""
         if self.parts:
             return [line for part in self.parts for line in part.warnings()]
-        said = [*self.raw.warnings, *self._contradicted_rate(), *self._wrapped_clock()]
+        said = [*self.raw.warnings, *self._contradicted_rate()]
+        if self.wrap is not None:
+            where = self.describe(self.wrap, "time")
+            said.append(f"the clock wraps around, and is counted on: {where}")
         if self.lost.any():
             rows = np.flatnonzero(self.lost)
             each = "; ".join(self.describe(row) for row in rows[:MAX_NAMED].tolist())
@@ -170,16 +175,6 @@ class Log:
                 f"or absurd: {each}{more}"
             )
         return said
-
-    def _wrapped_clock(self) -> list[str]:
-        """Say that the clock of the column of time began anew."""
-        if "time" not in self.places:
-            return []
-        times, _ = _counted_from_first(_ticks(self.raw, self.places["time"]))
-        if (wraps := _wraps(times)).any():
-            row = int(np.argmax(wraps > 0))
-            return [f"the clock wraps around, and is counted on: {self.describe(row, 'time')}"]
-        return []
 
     def _contradicted_rate(self) -> list[str]:
         """Say that a column of time tells another rate than the one that was given."""
@@ -357,15 +352,16 @@ def read_log(
 
 def _convert(
     raw: RawTable, layout: LogLayout, places: Mapping[str, int]
-) -> tuple[pd.DataFrame, float]:
-    """Convert the columns of a log to SI; also its first time."""
+) -> tuple[pd.DataFrame, float, int | None]:
+    """Convert the columns of a log to SI; also its first time, and where its clock began anew."""
     conditions = [key for key in places if key in CONDITIONS]
-    start, columns, count = np.nan, ["time", *AXES, *conditions], len(raw.content)
+    start, wrap, count = np.nan, None, len(raw.content)
+    columns = ["time", *AXES, *conditions]
     values = np.empty((len(columns), count))
     if "time" in places:
-        time, start = _counted_from_first(_ticks(raw, places["time"]))
-        factor = _time_factor(raw, layout, places)
-        time = _usable(time + _wraps(time)) * factor
+        ticks, start = _counted_from_first(_ticks(raw, places["time"]))
+        factor, (ticks, wrap) = _time_factor(raw, layout, places), _count_on(ticks)
+        time = _usable(ticks) * factor
         if "nanoseconds" in places:
             time += 1e-9 * _usable(raw.numbers(places["nanoseconds"]))
         first = next(iter(time[np.isfinite(time)]), 0.0)
@@ -387,7 +383,7 @@ def _convert(
     for condition, key in zip(values[4:], conditions, strict=True):
         condition[:] = _usable(raw.numbers(places[key]))
     pa.default_memory_pool().release_unused()
-    return pd.DataFrame(values.T, columns=columns, copy=False), start
+    return pd.DataFrame(values.T, columns=columns, copy=False), start, wrap
 
 
 def _ticks(raw: RawTable, place: int) -> NDArray[Any]:
@@ -395,14 +391,15 @@ def _ticks(raw: RawTable, place: int) -> NDArray[Any]:
     return raw.nanoseconds(place) if place in raw.dates else raw.numbers(place)
 
 
-def _wraps(times: Array) -> Array:
-    """Ticks to be added to times, (n,), since the clock began anew within a usual step."""
-    steps, added = np.diff(times), np.zeros(len(times))
-    if (steps < 0).any():
-        usual = np.nanmedian(steps)
-        for end in CLOCK_ENDS:
-            added[1:] += end * np.cumsum((steps + end > 0) & (steps + end <= GAP_RATIO * usual))
-    return added
+def _count_on(ticks: Array) -> tuple[Array, int | None]:
+    """Ticks (n,) of a clock that never begins anew, and the row at which it first did."""
+    steps = np.diff(ticks)
+    if not (steps < 0).any():
+        return ticks, None
+    added, usual = np.zeros(len(ticks)), np.nanmedian(steps)
+    for end in CLOCK_ENDS:
+        added[1:] += end * np.cumsum((steps + end > 0) & (steps + end <= GAP_RATIO * usual))
+    return ticks + added, int(np.argmax(added > 0)) if added.any() else None
 
 
 def _time_factor(raw: RawTable, layout: LogLayout, places: Mapping[str, int]) -> float:

@@ -11,11 +11,11 @@ from functools import cached_property
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy import special
 
 from accelstudy.adjustment.quality import Solution, solve
 from accelstudy.approaches import Approach
+from accelstudy.basics.arrays import Array
 from accelstudy.basics.errors import InputError
 from accelstudy.basics.levels import REFUTATION_LEVEL
 from accelstudy.campaign.calibration.fit import fit_campaign, least_sigma
@@ -40,8 +40,6 @@ from accelstudy.diagnosis.space.hypotheses import (
 from accelstudy.diagnosis.space.residuals import Residuals
 from accelstudy.diagnosis.space.shapes import LearnedShapes
 from accelstudy.sensors.sensor import SensorModel
-
-Array = NDArray[np.float64]
 
 ROUNDING = 1e-10
 """Residuals below this share of gravity are rounding errors, and no measurement."""

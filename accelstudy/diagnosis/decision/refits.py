@@ -158,8 +158,10 @@ def with_settings(frame: SessionFit, fit: Solution, chosen: Sequence[Hypothesis]
             low, high = low / RANGE_FACTOR, high * RANGE_FACTOR
         weights.append(12 / np.log([high / low]) ** 2)
     design, u = np.concatenate(columns, axis=1), len(fit.parameters)
-    if design.shape[1] == u or not np.isfinite(design).all():
-        cofactors = np.full(2 * design.shape[1:], np.nan)
+    if (every := design.shape[1]) == u:
+        return fit.cofactors
+    if not np.isfinite(design).all():
+        cofactors = np.full((every, every), np.nan)
         cofactors[:u, :u] = fit.cofactors
         return cofactors
     # Parameters of very different units: of columns of unit length the inverse is exact enough.

@@ -30,6 +30,7 @@ from numpy.typing import NDArray
 from scipy import special
 
 from accelstudy.adjustment.quality import GlobalTest
+from accelstudy.basics.arrays import Array
 from accelstudy.basics.levels import REFUTATION_LEVEL
 from accelstudy.diagnosis.evidence.detection import Chance
 from accelstudy.diagnosis.evidence.size import Evidence, log_mean
@@ -37,8 +38,6 @@ from accelstudy.diagnosis.rules import RULES
 from accelstudy.diagnosis.space.hypotheses import clusters
 from accelstudy.diagnosis.space.residuals import Residuals
 from accelstudy.noise_effects.coloured_noise import autocorrelation
-
-Array = NDArray[np.float64]
 
 LEVEL, AXES, COLOUR, TAILS = "noise_level", "axis_noise", "coloured_noise", "heavy_tails"
 STEPS = "quantisation"

@@ -10,8 +10,8 @@ import pandas as pd
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
-from numpy.typing import NDArray
 
+from accelstudy.basics.arrays import Array
 from accelstudy.basics.units import shown_unit, to_display
 from accelstudy.basics.wording import probability, words
 from accelstudy.diagnosis.decision.functions import LearnedShape
@@ -28,8 +28,6 @@ from accelstudy.drawing.style import (
     new_figure,
     say_empty,
 )
-
-Array = NDArray[np.float64]
 
 
 def diagnosis_figures(
@@ -75,7 +73,7 @@ def residual_figure(diagnosis: CampaignDiagnosis, positions: pd.DataFrame) -> Fi
     # Labels of narrow panels must not meet.
     ticks = 3 if len(panels) > 2 else 5
     # Residuals that exceed the stated noise must look too large.
-    sigma = np.sqrt(d.unit) * d.frame.residuals.sigma
+    sigma = np.sqrt(d.noise_variance) * d.frame.residuals.sigma
     for when, line in zip(rows, grid, strict=True):
         for (label, abscissa), ax in zip(panels.items(), line, strict=True):
             ax.axhspan(-2e3 * sigma, 2e3 * sigma, color=NOISE)

@@ -98,7 +98,7 @@ class Diagnosis(Result):
         """The calibration with what was found; why there is none if it cannot be assessed."""
         warnings = words.render("warnings", self.result)
         try:
-            fit = self.result.calibrated
+            fit = self.result.final_fit
             content = calibration_document(fit, self.result.recognised, warnings)
         except (InputError, LinAlgError) as error:
             return str(error)
@@ -128,7 +128,7 @@ class Diagnosis(Result):
                 "sigma": "known" if d.sigma_known else "unknown",
             },
             "noise": {
-                "sigma_mps2": d.calibrated.sigma_position,
+                "sigma_mps2": d.final_fit.sigma_position,
                 "sigma_source": "a-priori" if d.noise.trusted else "residuals",
                 "tests": d.noise_tests,
             },
