@@ -284,10 +284,10 @@ def _is_of(name: str, key: str, matches: Callable[[str], Any]) -> bool:
         return True
     plain = _plain(without_unit(name))
     ending = _AS_ENDING.fullmatch(plain)
-    unit = parse_unit(ending[2]) if ending else None
-    if own and unit not in (None, "", *own):  # "temp_F"
+    suffix = parse_unit(ending[2]) if ending else None
+    if own and suffix not in (None, "", *own):  # "temp_F"
         return False
-    return bool(matches(plain) or (ending and unit in own and matches(ending[1])))
+    return bool(matches(plain) or (ending and suffix in own and matches(ending[1])))
 
 
 def _plain(name: str) -> str:
