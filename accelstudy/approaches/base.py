@@ -4,8 +4,11 @@ from __future__ import annotations
 
 from typing import Any, ClassVar
 
+from accelstudy.basics.errors import InputError
 from accelstudy.basics.registry import Registry
 from accelstudy.effects.components import Number, Vector
+from accelstudy.symbolic.algebra import sp
+from accelstudy.symbolic.tracing import symbolic, symbols
 
 
 class Approach:
@@ -38,7 +41,23 @@ class Approach:
         return tuple(a - b for a, b in zip(f, force, strict=True))
 
 
-_registry: Registry[Approach] = Registry("approach", "approaches")
+def _check(approach: Approach) -> None:
+    """Check the conditions of a plug-in against what it says of them, as tests do with all others.
+
+    Raises
+    ------
+    InputError
+        If they are of another number, or depend on angles that are not observed.
+    """
+    angles, (g,) = symbols("roll", "pitch"), symbols("g")
+    conditions = approach.conditions(symbols("x", "y", "z"), angles, g, symbolic)
+    if len(conditions) != approach.n_conditions:
+        raise InputError(f"has {len(conditions)} conditions, not {approach.n_conditions}")
+    if not approach.uses_angles and sp.Matrix(conditions).free_symbols & {*angles}:
+        raise InputError("has conditions on angles, but uses_angles is false")
+
+
+_registry: Registry[Approach] = Registry("approach", "approaches", _check)
 get_approach = _registry.get
 approach_names = _registry.names
 register = _registry.register

@@ -1,25 +1,26 @@
 """Plug-ins: effects, schemes and the like of the user's own, from a file or an installed package.
 
 Its code registers what it has when it is imported, as the modules of this package do. A file is
-loaded when it is named: `--plugin` of a command, `plugins` of a configuration. A file of data, such
-as a model.yaml, may be of anybody, so it only names what it needs. A package names its modules as
-entry points of the group ``accelstudy.`` and the room, such as ``accelstudy.effects``;
-they are imported when something of that room is first looked up.
+loaded when it is named: `--plugin` of a command, `plugins` of a configuration; a program imports
+it, or has its code. A file of data, such as a model.yaml, may be of anybody, so it only names what
+it needs. A package names its modules as entry points of the group ``accelstudy.`` and the room,
+such as ``accelstudy.effects``; they are imported when something of that room is first looked up.
 """
 
 from __future__ import annotations
 
 import hashlib
+import os
 import sys
 import traceback
-from collections.abc import Collection, Iterable, Iterator, Mapping
+from collections.abc import Callable, Collection, Iterable, Iterator, Mapping
 from contextlib import contextmanager
-from functools import cache
+from functools import cache, lru_cache
 from importlib.metadata import EntryPoint, entry_points
 from importlib.util import find_spec
 from pathlib import Path
 from types import ModuleType
-from typing import Any
+from typing import Any, NamedTuple, TypeVar
 
 from accelstudy.basics.errors import InputError, locate_errors, reason_of
 from accelstudy.basics.names import check_file_name
@@ -31,25 +32,63 @@ HOW = "; of a plug-in: name its file with --plugin or, in a configuration, under
 """What a message adds to the names that are known."""
 _CODE = (".py", ".yaml", ".yml", ".json", ".j2")
 
+
+class Source(NamedTuple):
+    """Where registered code is: the name of its plug-in, and its own name there."""
+
+    plugin: str
+    code: str
+
+
 _files: dict[str, str] = {}
 """Digest by name, of the files that are loaded."""
 _loading: list[str] = []
-"""Names of what is being loaded, the innermost last; empty for accelstudy itself."""
-_sources: dict[tuple[str, str], str] = {}
-"""Name of the plug-in by kind and name of what it registered."""
+"""Names of the plug-ins that are being loaded, the innermost last."""
+_sources: dict[tuple[str, str], Source] = {}
+"""Source by kind and name of what plug-ins registered."""
+_lookups: list[Any] = []
+"""Caches of what is looked up by name."""
+
+Lookup = TypeVar("Lookup", bound=Callable[..., Any])
 
 
-def note_registration(kind: str, name: str) -> bool:
-    """Note what is registered; return whether a plug-in does it."""
-    of_plugin = bool(_loading and _loading[-1])
-    if of_plugin:
-        _sources[kind, name] = _loading[-1]
-    return of_plugin
+def cached_lookup(function: Lookup) -> Lookup:
+    """Cache what a function looks up by name, until a plug-in registers something."""
+    _lookups.append(lru_cache(maxsize=None)(function))
+    return _lookups[-1]
+
+
+def is_plugin(code: Any) -> bool:
+    """Whether a class or function is not of this package."""
+    return not code.__module__.startswith(PREFIX)
+
+
+def is_known(kind: str, name: str, code: Any) -> bool:
+    """Whether a name is that of the same code, which was changed or is imported once more."""
+    return _sources.get((kind, name)) == _source(code)
+
+
+def note_registration(kind: str, name: str, code: Any) -> None:
+    """Note what code of a plug-in registers."""
+    source = _sources[kind, name] = _source(code)
+    if not _loading and os.path.isfile(source.plugin):  # an imported file
+        _files[source.plugin] = _digest(Path(source.plugin).read_bytes())
+    for lookup in _lookups:
+        lookup.cache_clear()
+
+
+def _source(code: Any) -> Source:
+    """Source of a class or function: what is being loaded, or else its file, package or module."""
+    module = code.__module__
+    installed = (label(point) for point in _entry_points(tuple(sys.path)) if point.module == module)
+    file = getattr(sys.modules.get(module), "__file__", None)
+    files = [os.path.relpath(file)] if file else []
+    return Source([*_loading[-1:], *installed, *files, module][0], code.__qualname__)
 
 
 def source_of(kind: str, name: str) -> str:
     """Return the name of the plug-in that something is of; empty if it is of accelstudy."""
-    return _sources.get((kind, name), "")
+    return _sources.get((kind, name), Source("", "")).plugin
 
 
 def load_files(paths: Iterable[str | Path]) -> None:
@@ -115,7 +154,7 @@ def _load_file(path: Path) -> None:
         raise InputError(f"{path}: no such file") from None
     except OSError as error:
         raise InputError(f"{path}: cannot be read: {reason_of(error)}") from None
-    digest = hashlib.sha256(content).hexdigest()[:16]
+    digest = _digest(content)
     if digest in _files.values():
         return
     # Under a name that nobody else has, and without a copy in __pycache__ that may be old.
@@ -127,6 +166,10 @@ def _load_file(path: Path) -> None:
         with _registering(str(path)):
             exec(code, vars(module))
     _files[str(path)] = digest
+
+
+def _digest(content: bytes) -> str:
+    return hashlib.sha256(content).hexdigest()[:16]
 
 
 def loaded_files() -> list[str]:
@@ -201,22 +244,14 @@ def code_digest(*folders: Path, without: Collection[Path] = ()) -> str:
 
 
 @contextmanager
-def loading(name: str = "") -> Iterator[None]:
-    """Note what is registered as that of a plug-in, or of accelstudy without a name."""
+def _registering(name: str) -> Iterator[None]:
+    """Load a plug-in, which has to register something."""
     _loading.append(name)
     try:
         yield
     finally:
         _loading.pop()
-
-
-@contextmanager
-def _registering(name: str) -> Iterator[None]:
-    """Load a plug-in, which has to register something."""
-    before = len(_sources)
-    with loading(name):
-        yield
-    if len(_sources) == before:
+    if all(source.plugin != name for source in _sources.values()):
         raise InputError(NOTHING)
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import inspect
 import math
 import re
 from collections.abc import Callable, Collection, Iterable, Iterator, Mapping
@@ -39,12 +40,23 @@ class Registry(Generic[Item]):
         self._items: dict[str, Item] = {}
         self._unlisted: frozenset[str] = frozenset()
 
-    def add(self, name: str, item: Item) -> None:
-        """Register an item; raise `InputError` if its name is taken."""
-        if name in self._items:
+    def add(self, name: str, item: Item, code: Any = None) -> None:
+        """Register an item, of the class or function `code`; it replaces that of the same code.
+
+        Raises
+        ------
+        InputError
+            If its name is taken, or it is of a plug-in and cannot be used.
+        """
+        code = code or type(item)
+        if name in self._items and not plugins.is_known(self.kind, name, code):
             raise InputError(f"the {self.kind} {name!r} is there already; choose another name")
-        if plugins.note_registration(self.kind, name) and self._check:
-            self._check(item)
+        if plugins.is_plugin(code):
+            with plugins.error_as_line(f"{self.kind} {name!r}"):
+                _check_complete(item)
+                if self._check:
+                    self._check(item)
+            plugins.note_registration(self.kind, name, code)
         self._items[name] = item
 
     @property
@@ -57,7 +69,7 @@ class Registry(Generic[Item]):
 
     def register(self, kind: Kind) -> Kind:
         """Class decorator: enter one object of a class into the registry under its name."""
-        self.add(kind.name, kind())
+        self.add(getattr(kind, "name", kind.__name__), kind())
         return kind
 
     def unlisted(self, kind: Kind) -> Kind:
@@ -89,6 +101,13 @@ class Registry(Generic[Item]):
             yield
         finally:
             self._unlisted = before
+
+
+def _check_complete(item: object) -> None:
+    """Raise `InputError` if a class lacks attributes that its bases declare without a value."""
+    declared = [name for base in type(item).__mro__ for name in inspect.get_annotations(base)]
+    if missing := [name for name in declared if not hasattr(item, name)]:
+        raise InputError(f"lacks {', '.join(missing)}")
 
 
 @dataclass(frozen=True)
@@ -184,11 +203,11 @@ ItemWithSettings = TypeVar("ItemWithSettings", bound=WithSettings)
 class RegistryWithSettings(Registry[ItemWithSettings]):
     """Things found by their name, or by their name and settings: ``warm_up(tau=300)``."""
 
-    def add(self, name: str, item: ItemWithSettings) -> None:
-        """Register an item; raise `InputError` if its name is taken or is no word."""
+    def add(self, name: str, item: ItemWithSettings, code: Any = None) -> None:
+        """Register an item; raise `InputError` also if its name is no word."""
         if not re.fullmatch(r"\w+", name):
             raise InputError(f"{self.kind} {name!r}: a name has letters, digits and _ only")
-        super().add(name, item)
+        super().add(name, item, code)
 
     def get(self, spec: str) -> ItemWithSettings:
         """Return the item of that name, with the settings that are given.
@@ -226,6 +245,5 @@ class RegistryWithSettings(Registry[ItemWithSettings]):
 
 def import_modules(package: str, path: Iterable[str]) -> None:
     """Import all modules of a package, so that what they register is known."""
-    with plugins.loading():
-        for module in iter_modules(path):
-            import_module(f"{package}.{module.name}")
+    for module in iter_modules(path):
+        import_module(f"{package}.{module.name}")

@@ -8,7 +8,6 @@ from __future__ import annotations
 import re
 from collections.abc import Iterable, Sequence
 from contextlib import AbstractContextManager
-from functools import cache
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -16,6 +15,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from accelstudy.basics.arrays import Array
+from accelstudy.basics.plugins import cached_lookup
 from accelstudy.basics.units import display_unit, recorded_unit, to_display, to_si, unit_label
 from accelstudy.effects import Parameter, effect_names, get_effect
 from accelstudy.sensors.models import NINE
@@ -109,7 +109,7 @@ def cause(effect: str) -> str:
     return "course" if found.is_course else "sensor"
 
 
-@cache
+@cached_lookup
 def _parameters() -> dict[str, tuple[str, Parameter]]:
     known = {
         parameter.name: (effect, parameter)

@@ -25,6 +25,7 @@ import numpy as np
 
 from accelstudy.basics.arrays import Array
 from accelstudy.basics.errors import InputError, check_name
+from accelstudy.basics.plugins import cached_lookup
 from accelstudy.basics.registry import RegistryWithSettings, WithSettings
 from accelstudy.basics.units import STANDARD_GRAVITY
 from accelstudy.effects.components import (
@@ -214,21 +215,21 @@ def _check(effect: Effect) -> None:
         If it has a parameter of another effect, a wrong number of components, or a formula that is
         not linear in its parameters.
     """
-    name = f"effect {effect.name!r}"
     for other in map(get_effect, effect_names()):
-        if taken := {p.name for p in effect.parameters} & {p.name for p in other.parameters}:
-            raise InputError(f"{name}: {min(taken)} is a parameter of {other.name!r} already")
+        shared = {p.name for p in effect.parameters} & {p.name for p in other.parameters}
+        if shared and other.name != effect.name:
+            raise InputError(f"{min(shared)} is a parameter of {other.name!r} already")
     output, axes, reading = expressions(effect)
     entries = [entry for row in axes for entry in row]
     components = {"output": (output, 3), "axes": (entries, 9), "reading": (reading, 2)}
     for method, (parts, number) in components.items():
         if len(parts) != number:
-            raise InputError(f"{name}: {method} has {len(parts)} components, not {number}")
+            raise InputError(f"{method} has {len(parts)} components, not {number}")
     own = symbols(*(parameter.name for parameter in effect.parameters))
     zero = dict.fromkeys(own, 0)
     for part in map(sp.sympify, (*output, *entries, *reading)):
         if part.xreplace(zero) != 0 or any(part.diff(p).free_symbols & {*own} for p in own):
-            raise InputError(f"{name}: {_text(part)} is not linear in {', '.join(map(str, own))}")
+            raise InputError(f"{_text(part)} is not linear in {', '.join(map(str, own))}")
 
 
 _registry: RegistryWithSettings[Effect] = RegistryWithSettings("effect", "effects", _check)
@@ -243,7 +244,7 @@ def is_effect(name: str) -> bool:
     return name in _registry
 
 
-@cache
+@cached_lookup
 def get_effect(spec: str) -> Effect:
     """Return an effect by its name, or by its name and settings: ``warm_up(tau=300)``.
 

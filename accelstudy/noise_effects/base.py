@@ -7,12 +7,12 @@ other. Everything is in m/s², of R sessions of n holds with three axes.
 
 from __future__ import annotations
 
-from functools import cache
 from typing import ClassVar
 
 import numpy as np
 
 from accelstudy.basics.arrays import Array
+from accelstudy.basics.plugins import cached_lookup
 from accelstudy.basics.registry import RegistryWithSettings, WithSettings
 from accelstudy.effects import HoldConditions
 
@@ -62,7 +62,7 @@ noise_effect_names = _registry.names
 register = _registry.register
 
 
-@cache
+@cached_lookup
 def get_noise_effect(spec: str) -> NoiseEffect:
     """Return a noise effect by its name, with settings or not: ``heavy_tails(nu=3)``."""
     return _registry.get(spec)

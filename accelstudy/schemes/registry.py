@@ -7,18 +7,16 @@ import os
 import re
 from collections.abc import Callable
 from dataclasses import dataclass
-from functools import lru_cache
 from os import PathLike
 from typing import TypeVar
 
-import numpy as np
 from numpy.typing import ArrayLike
 
 from accelstudy.basics.arguments import check_type
 from accelstudy.basics.errors import InputError, UnknownNameError
-from accelstudy.basics.plugins import HOW
+from accelstudy.basics.plugins import HOW, cached_lookup
 from accelstudy.basics.registry import Registry
-from accelstudy.positions.scheme import Scheme, Status
+from accelstudy.positions.scheme import Scheme, Status, unit_vectors
 from accelstudy.schemes.files import is_scheme_file, known_scheme, scheme_of_file
 
 Builder = Callable[..., ArrayLike]
@@ -40,7 +38,10 @@ class _Entry:
         if match is None:
             return None
         numbers = [int(group) for group in match.groups()]
-        directions = np.asarray(self.build(*numbers), dtype=np.float64)
+        try:
+            directions = unit_vectors(self.build(*numbers))
+        except ValueError as error:
+            raise InputError(f"scheme {name!r}: {error}") from None
         title = f"{len(directions)} {self.title.format(*numbers)}"
         return Scheme(name, title, directions, self.status, self.source)
 
@@ -86,7 +87,8 @@ def register(
 
     def decorate(build: AnyBuilder) -> AnyBuilder:
         listed = names if names is not None else () if _is_family(template) else (template,)
-        _registry.add(template, _Entry(template, title, status, source, listed, build))
+        entry = _Entry(template, title, status, source, listed, build)
+        _registry.add(template, entry, build)
         return build
 
     return decorate
@@ -119,7 +121,7 @@ def get_scheme(name: str | PathLike[str]) -> Scheme:
     return known_scheme(name) or _registered(name)
 
 
-@lru_cache
+@cached_lookup
 def _registered(name: str) -> Scheme:
     # A scheme that has exactly this name goes before a family that it fits.
     for entry in sorted(_entries(), key=lambda entry: _is_family(entry.template)):

@@ -10,11 +10,10 @@ from __future__ import annotations
 import os
 import re
 from collections.abc import Mapping, Sequence
-from functools import cache
 from typing import Any
 
 from accelstudy.basics.errors import InputError, UnknownNameError, locate_errors
-from accelstudy.basics.plugins import HOW, explain_missing
+from accelstudy.basics.plugins import HOW, cached_lookup, explain_missing
 from accelstudy.effects import Effect, effect_names, get_effect, is_effect
 from accelstudy.files.reading import read_layer
 from accelstudy.sensors.sensor import SensorModel
@@ -97,7 +96,7 @@ def composition_name(effects: Sequence[Effect]) -> str:
     return "+".join((base, *specs[len(MODELS[base]) :]))
 
 
-@cache
+@cached_lookup
 def compose(name: str, effects: tuple[str, ...]) -> SensorModel:
     """Compose a model of effects; the same model, traced once, for the same arguments."""
     return SensorModel.of(name, effects)

@@ -61,9 +61,8 @@ def _effect(item: Effect | NoiseEffect) -> Row:
             "family": item.family,
         }
     else:
-        setting = item.takes[0]
-        typical = f"{setting.name} {_ends(item.typical)} {_unit(setting.unit)}"
-        row |= {"part": "noise", "typical": typical.rstrip()}
+        first = [f"{s.name} {_ends(item.typical)} {_unit(s.unit)}" for s in item.takes[:1]]
+        row |= {"part": "noise", "typical": "".join(first).rstrip()}
     return row | {"settings": "; ".join(settings), "plugin": source_of(item.kind, item.name)}
 
 

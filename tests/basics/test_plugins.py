@@ -1,5 +1,7 @@
 """Plug-ins: a file or an installed package adds to the registries; what is wrong is one line."""
 
+import importlib
+import re
 import shutil
 import sys
 from pathlib import Path
@@ -11,13 +13,19 @@ from places import ROOT
 from plugin_helpers import forgotten
 from snakemake_helpers import jobs, snakemake
 
+from accelstudy import catalogue
+from accelstudy.approaches import base as approaches
 from accelstudy.basics import plugins
+from accelstudy.basics.errors import InputError
 from accelstudy.data_sheets import data_sheet_names, get_data_sheet
+from accelstudy.drawing.style import symbol
 from accelstudy.effects import effect_names, get_effect
 from accelstudy.files.reading import config_hash
 from accelstudy.files.tables import read_origin
 from accelstudy.jobs import code_version
+from accelstudy.noise_effects import base as noise_effects
 from accelstudy.schemes import get_scheme
+from accelstudy.schemes import register as register_scheme
 from accelstudy.sensors.models import get_model
 from accelstudy.study.config import read_study
 
@@ -60,6 +68,91 @@ def test_a_file_is_loaded_once_wherever_it_is_named():
     shutil.copy("ripple.py", "copy.py")
     plugins.load_files(["ripple.py", "ripple.py", Path("ripple.py").resolve(), "copy.py"])
     assert plugins.loaded_files() == ["ripple.py"]
+
+
+# --- code of a program ---------------------------------------------------------------------------
+
+
+def run(cell):
+    """Run code as a notebook does."""
+    exec(cell, {"__name__": "notebook"})
+
+
+def bump(body="p[0] * f[0], 0, 0", name="Bump", parameter="a_bump"):
+    """Code of an effect."""
+    return f"""
+from accelstudy.effects.base import Effect, per_axis, register
+
+@register
+class {name}(Effect):
+    name = "bump"
+    parameters = per_axis("{parameter}", "1", "a_%", "x")
+
+    def output(self, f, p, g, hold, xp):
+        return {body}
+"""
+
+
+@pytest.mark.parametrize(("body", "changes", "message"), [
+    ("xp.sin(p[0] * f[0]), 0, 0", {}, "sin(a_bump_x*f_x) is not linear in a_bump_x"),
+    ("p[0] * f[0], 0", {}, "output has 2 components, not 3"),
+    ("p[0] * f[0], 0, 0", {"parameter": "b"}, "b_x is a parameter of 'bias' already"),
+    ("p[0], 0, f[3]", {}, "IndexError: tuple index out of range"),
+])  # fmt: skip
+def test_what_a_program_registers_is_checked(body, changes, message):
+    with pytest.raises(InputError, match=f"^effect 'bump': {re.escape(message)}$"):
+        run(bump(body, **changes))
+    assert "bump" not in effect_names()
+
+
+def test_a_cell_that_runs_again_replaces_what_it_registered():
+    assert symbol("b_x")
+    run(bump())
+    assert plugins.source_of("effect", "bump") == "notebook"
+    first = get_model("bias-scale+bump")
+    run(bump("p[0] * f[1], 0, 0"))
+    assert "f_y" in get_effect("bump").equation
+    assert get_model("bias-scale+bump") != first
+    assert symbol("a_bump_x") == "$a_x$"
+    with pytest.raises(InputError, match="is there already"):
+        run(bump(name="Other"))
+
+
+def test_an_imported_file_is_the_one_that_a_configuration_names(monkeypatch):
+    monkeypatch.syspath_prepend(Path.cwd())
+    monkeypatch.delitem(sys.modules, "ripple", raising=False)
+    ripple = importlib.import_module("ripple")
+    assert plugins.loaded_files() == [plugins.source_of("effect", "ripple")] == ["ripple.py"]
+    assert read_study(written()).cells
+    importlib.reload(ripple)
+    Path("ripple.py").write_text(Path("ripple.py").read_text() + "\n# Changed.\n")
+    assert read_study(written()).cells
+
+
+@pytest.mark.parametrize(("attributes", "message"), [
+    ({"n_conditions": 3, "uses_angles": True}, "has 1 conditions, not 3"),
+    ({"n_conditions": 1}, "lacks uses_angles"),
+    ({"n_conditions": 1, "uses_angles": False}, "has conditions on angles, but .*"),
+])  # fmt: skip
+def test_an_approach_has_the_conditions_that_it_says(attributes, message):
+    conditions = lambda self, f, angles, g, xp: (f[0] - g * xp.sin(angles[1]),)  # noqa: E731
+    content = {"name": "one_axis", "conditions": conditions, **attributes}
+    with pytest.raises(InputError, match=f"^approach 'one_axis': {message}$"):
+        approaches.register(type("OneAxis", (approaches.Approach,), content))
+
+
+def test_a_scheme_without_directions_is_one_line():
+    register_scheme("flat", title="", status="generated", source="")(lambda: [[1, 0], [0, 1]])
+    with pytest.raises(
+        InputError, match=r"^scheme 'flat': directions must have the shape \(n, 3\)"
+    ):
+        get_scheme("flat")
+
+
+def test_a_noise_effect_needs_no_setting():
+    double = {"name": "double", "equation": "2 v", "typical": (1, 1)}
+    noise_effects.register(type("Double", (noise_effects.NoiseEffect,), double))
+    assert catalogue("effects").loc["double", "typical"] == ""
 
 
 # --- configurations ------------------------------------------------------------------------------

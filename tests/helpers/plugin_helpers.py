@@ -5,11 +5,9 @@ import contextlib
 from accelstudy.approaches import base as approaches
 from accelstudy.basics import plugins
 from accelstudy.data_sheets import reading
-from accelstudy.drawing import style
 from accelstudy.effects import base as effects
 from accelstudy.noise_effects import base as noise_effects
 from accelstudy.schemes import registry as schemes
-from accelstudy.sensors import models
 from accelstudy.study.figures import registry as figures
 
 REGISTRIES = {
@@ -20,10 +18,6 @@ REGISTRIES = {
     None: figures._REGISTRY,
 }
 """Registries, by the room for which packages may have something."""
-CACHES = (
-    *(effects.get_effect, noise_effects.get_noise_effect, schemes._registered),
-    *(style._parameters, models.compose, reading._files, reading._shipped),
-)
 
 
 @contextlib.contextmanager
@@ -34,13 +28,16 @@ def forgotten():
     before = [dict(each) for each in changed]
     for room, registry in REGISTRIES.items():
         registry._room = room
-    for cache in CACHES:
-        cache.cache_clear()
+    _clear()
     try:
         yield
     finally:
         for each, kept in zip(changed, before, strict=True):
             each.clear()
             each.update(kept)
-        for cache in CACHES:
-            cache.cache_clear()
+        _clear()
+
+
+def _clear():
+    for cache in (*plugins._lookups, reading._files, reading._shipped):
+        cache.cache_clear()

@@ -75,7 +75,8 @@ def register(
         title, _, caption = text.partition(".\n\n")
         has_it = when or (lambda study: category != "Paper" or study.paper)
         drawn = partial(draw, **settings)
-        _REGISTRY.add(name, FigureEntry(name, title, caption, drawn, category, tables, has_it))
+        entry = FigureEntry(name, title, caption, drawn, category, tables, has_it)
+        _REGISTRY.add(name, entry, draw)
         return draw
 
     return decorate
