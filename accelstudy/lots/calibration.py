@@ -17,7 +17,7 @@ from accelstudy.campaign.calibration.campaign_fit import CampaignFit
 from accelstudy.campaign.calibration.fit import fit_campaign
 from accelstudy.leveling.error import attitudes_in_use, tilt_error
 from accelstudy.lots.file_format import Tilt
-from accelstudy.lots.lot import LotDiagnosis
+from accelstudy.lots.lot import LotDiagnosis, models_with
 from accelstudy.lots.passes import LotEffect
 from accelstudy.lots.type_parameter import TypeParameter
 from accelstudy.sensors.models import compose
@@ -43,11 +43,13 @@ class LotCalibration:
 
     @classmethod
     def of(cls, diagnosis: LotDiagnosis, model: SensorModel) -> LotCalibration:
-        """Calibrate each sensor, with its own times of what is sudden."""
+        """Calibrate each sensor with what was found; what explains a part only is not."""
         fits, failed = dict[int, CampaignFit](), dict[str, str]()
-        for i, sensor in enumerate(diagnosis.last.sensors):
+        sensors = diagnosis.last.sensors
+        models = models_with(diagnosis.effects, model, len(sensors))
+        for i, (sensor, with_found) in enumerate(zip(sensors, models, strict=True)):
             try:
-                fits[i] = fit_campaign(sensor.campaign, sensor.model, sensor.approach)
+                fits[i] = fit_campaign(sensor.campaign, with_found, sensor.approach)
             except InputError as error:
                 failed[sensor.campaign.name] = str(error)
         return cls(diagnosis, model, fits, failed)

@@ -180,10 +180,7 @@ def weigh_lot(
 
         def weigh_with(effects: Sequence[LotEffect]) -> Pass:
             """Weigh all sensors with some effects, and with the noise that they tell together."""
-            models = [
-                extended(model, [one.specs[i] for one in effects if one.spec])
-                for i in range(len(sensors))
-            ]
+            models = models_with(effects, model, len(sensors))
             return Pass.of(with_noise_of_lot(sensors, models), mapped)
 
         while True:
@@ -194,7 +191,7 @@ def weigh_lot(
                 break
             chosen = _settle([*effects, *new], weigh_with)
             after = weigh_with(chosen)
-            if not any(one.base for one in after.evidence):  # no campaign determines so much
+            if not after.determined:
                 break
             passes, effects = [*passes, after], chosen
         nameless = any(one.spec is None and one.names[0] not in NOISES for one in effects)
@@ -225,7 +222,7 @@ def _settle(effects: Sequence[LotEffect], weigh_with: Weighing) -> list[LotEffec
 def _explained(now: Pass, effects: Sequence[LotEffect], weigh_with: Weighing) -> bool:
     """Whether what was found explains the lot, with the most probable of what is not sure."""
     effects = list(effects)
-    while now.p_value_of_usual < LEVEL_OF_REST:
+    while now.determined and now.p_value_of_usual < LEVEL_OF_REST:
         best = now.best
         if best.names[0] in NOISES or best.is_one_of(effects):
             return True
@@ -233,7 +230,7 @@ def _explained(now: Pass, effects: Sequence[LotEffect], weigh_with: Weighing) ->
             return False
         effects.append(best)
         now = weigh_with(effects)
-    return any(one.base for one in now.evidence)
+    return now.determined
 
 
 def with_noise_of_lot(sensors: Sequence[Sensor], models: Sequence[SensorModel]) -> list[Sensor]:
@@ -247,6 +244,11 @@ def with_noise_of_lot(sensors: Sequence[Sensor], models: Sequence[SensorModel]) 
 
     each = zip(sensors, models, noises_of_lot(len(sensors), fit), strict=True)
     return [replace(sensor, model=model, noise=noise) for sensor, model, noise in each]
+
+
+def models_with(effects: Sequence[LotEffect], model: SensorModel, n: int) -> list[SensorModel]:
+    """Models of n sensors with some effects, each with its own times of what is sudden."""
+    return [extended(model, [one.specs[i] for one in effects if one.spec]) for i in range(n)]
 
 
 def extended(model: SensorModel, specs: Iterable[str]) -> SensorModel:

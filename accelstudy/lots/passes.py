@@ -152,6 +152,11 @@ class Pass:
 
     # --- what the sensors tell --------------------------------------------------------------
 
+    @property
+    def determined(self) -> bool:
+        """Whether any campaign determines its model; without one there is nothing to weigh."""
+        return any(one.base is not None for one in self.evidence)
+
     @cached_property
     def residuals(self) -> LotResiduals:
         """Residuals of the sensors."""

@@ -105,3 +105,25 @@ def test_the_command_says_what_a_lot_lacks(tmp_path):
     said = succeed("calibrate", folders[0], "--model", model, "--out", tmp_path / "c").stdout
     assert "ACCEPTED" in said
     assert "b_T_x" in said
+
+
+@pytest.mark.usefixtures("composed")
+def test_what_names_explain_only_in_part_leaves_the_model_as_it_was(tmp_path):
+    """A thermal bias, and a pattern in common that nothing explains, at two temperatures.
+
+    Beside the thermal bias these do not determine the curve that comes closest to the pattern.
+    """
+    campaigns, pattern = list[acs.Campaign](), np.random.default_rng(9).normal(0, 0.002, (18, 3))
+    warm = np.random.default_rng(1).permutation(18) % 2
+    for i in range(4):
+        one = acs.simulate_campaign(
+            name=f"sensor-{i}", seed=i, scheme="fibonacci-18", sigma="1 mm/s^2", approach="gravity"
+        )
+        forces = one.forces + pattern + np.outer(30 * warm - 15, (3e-3, -3e-3, 3e-3))
+        campaigns.append(one.with_arrays(forces=forces, temperature=5.0 + 30 * warm))
+    lot = acs.lot(campaigns)
+    assert lot.state == "unknown"
+    assert lot.content["close"] == [["thermal_bias"]]
+    lot.save(tmp_path / "lot")
+    for calibration in lot.calibrations.values():
+        assert calibration.fit.model.name == "bias-scale-nonorthogonality"
