@@ -9,12 +9,14 @@ from functools import cached_property
 
 import numpy as np
 
+from accelstudy.adjustment.observations import Known
 from accelstudy.basics.arrays import Array
 from accelstudy.basics.errors import InputError
 from accelstudy.basics.levels import MAX_TILT_GON
 from accelstudy.basics.units import MGON
 from accelstudy.campaign.calibration.campaign_fit import CampaignFit
 from accelstudy.campaign.calibration.fit import fit_campaign
+from accelstudy.campaign.sensor_type import SensorType
 from accelstudy.leveling.error import attitudes_in_use, tilt_error
 from accelstudy.lots.file_format import Tilt
 from accelstudy.lots.lot import LotDiagnosis, models_with
@@ -22,6 +24,9 @@ from accelstudy.lots.passes import LotEffect
 from accelstudy.lots.type_parameter import TypeParameter
 from accelstudy.sensors.models import compose
 from accelstudy.sensors.sensor import SensorModel
+
+MIN_SHARE = 1e-6
+"""Least posterior probability that a sensor has an effect of which something is expected."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -107,13 +112,24 @@ class LotCalibration:
         """
         squares = []
         if any(found.spec is not None for found in self.diagnosis.effects):
-            for fit in self.usual.values():
+            for i, fit in self.usual.items():
                 with suppress(InputError):
-                    squares.append(_squared_error(fit, self.model))
+                    squares.append(_squared_error(fit, self.model, self._expected(i)))
         if not squares:
             return None
         roll, pitch = np.sqrt(np.maximum(np.mean(squares, axis=0), 0.0)) / MGON
         return Tilt(roll_mgon=roll, pitch_mgon=pitch, max_tilt_gon=MAX_TILT_GON)
+
+    def _expected(self, i: int) -> Known:
+        """Mean and sd of what a sensor has of the effects by the others, which may be nothing."""
+        expected = dict[str, tuple[float, float]]()
+        for found in self.diagnosis.effects:
+            p = max(float(found.having[i]), MIN_SHARE)
+            for one in self.sizes(found):
+                known = one if one.informative.any() else replace(one, has=one.usual)
+                square = known.scatter**2 + known.sigma**2 + (1 - p) * known.mean**2
+                expected[one.name] = (p * known.mean, float(np.sqrt(p * square)))
+        return expected
 
 
 def _parameters_of(found: LotEffect) -> Sequence[str]:
@@ -121,12 +137,19 @@ def _parameters_of(found: LotEffect) -> Sequence[str]:
     return () if found.spec is None else compose(found.spec, (found.spec,)).parameter_names
 
 
-def _squared_error(fit: CampaignFit, model: SensorModel) -> Array:
-    """Square of the error less that by noise: of nested models the difference of covariances."""
-    base = replace(fit_campaign(fit.campaign, model, fit.approach), judgement=fit.noise)
+def _squared_error(fit: CampaignFit, model: SensorModel, expected: Known) -> Array:
+    """Mean square of the tilt error of a model that lacks effects of which something is expected.
+
+    With what is expected as an observation, the estimates of the two models differ by the effects,
+    and not by the noise; the difference of covariances is what is not known of the effects.
+    """
+    of_type = replace(fit.campaign, sensor_type=SensorType("", len(expected), expected))
+    whole, base = (
+        replace(fit_campaign(campaign, one, fit.approach), judgement=fit.noise)
+        for campaign, one in ((of_type, fit.model), (fit.campaign, model))
+    )
     f_b, hold = attitudes_in_use(fit.campaign.hold, fit.campaign.n_positions, fit.gravity)
     error = tilt_error(
-        fit.model, fit.parameters, model, base.parameters, f_b, fit.gravity, hold
+        fit.model, whole.parameters, model, base.parameters, f_b, fit.gravity, hold
     ).constant
-    by_noise = fit.tilt.parameters**2 - base.tilt.parameters**2
-    return np.asarray(error - by_noise)
+    return np.asarray(error + whole.tilt.parameters**2 - base.tilt.parameters**2)

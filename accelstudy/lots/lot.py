@@ -22,7 +22,6 @@ from accelstudy.basics.errors import InputError
 from accelstudy.campaign.calibration.fit import usual_approach
 from accelstudy.campaign.session import Campaign
 from accelstudy.diagnosis.decision.problem import BaseFit
-from accelstudy.diagnosis.evidence.noise import NOISES
 from accelstudy.lots.evidence import Sensor, SensorEvidence
 from accelstudy.lots.noise import NoisePrior, noises_of_lot
 from accelstudy.lots.passes import (
@@ -194,7 +193,7 @@ def weigh_lot(
             if not after.determined:
                 break
             passes, effects = [*passes, after], chosen
-        nameless = any(one.spec is None and one.names[0] not in NOISES for one in effects)
+        nameless = any(one.spec is None and not one.is_noise for one in effects)
         explained = not nameless and _explained(passes[-1], effects, weigh_with)
     if explained:
         whole = extended(model, [one.spec for one in effects if one.spec])
@@ -224,7 +223,7 @@ def _explained(now: Pass, effects: Sequence[LotEffect], weigh_with: Weighing) ->
     effects = list(effects)
     while now.determined and now.p_value_of_usual < LEVEL_OF_REST:
         best = now.best
-        if best.names[0] in NOISES or best.is_one_of(effects):
+        if best.is_noise or best.is_one_of(effects):
             return True
         if best.spec is None or len(effects) >= MAX_EFFECTS:
             return False

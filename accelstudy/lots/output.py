@@ -139,6 +139,7 @@ class Lot(Result):
             alternatives=[f"{either(names[:3])} ({probability(p)})" for names, p in d.alternatives],
             tested_alone=sum(one.p_value < LEVEL for one in d.evidence),
             named_alone=sum(max(one.odds, key=one.odds.__getitem__) in first for one in d.evidence),
+            missing=[either(one.names) for one in d.effects if one.spec],
             max_tilt=MAX_TILT_GON * GON,
         )
 

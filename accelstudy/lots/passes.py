@@ -9,7 +9,7 @@ from functools import cached_property
 from typing import TYPE_CHECKING, Any, NamedTuple, TypeAlias
 
 import numpy as np
-from scipy import stats
+from scipy import special, stats
 
 from accelstudy.basics.arrays import Array
 from accelstudy.basics.progress import track
@@ -79,6 +79,11 @@ class LotEffect(NamedTuple):
     other_size: Array
     parameters: Sequence[TypeParameter] = ()
 
+    @property
+    def is_noise(self) -> bool:
+        """Whether it is that the noise is not as stated, most probably."""
+        return self.names[0] in NOISES
+
     def is_one_of(self, effects: Sequence[LotEffect]) -> bool:
         """Whether one of some effects has the same most probable name."""
         return self.names[0] in {one.names[0] for one in effects}
@@ -97,8 +102,8 @@ class OddSensor(NamedTuple):
     Attributes
     ----------
     campaign : str
-    names : tuple of str, of that effect
-    posterior : float
+    names : tuple of str, between which its campaign does not decide, the most probable first
+    posterior : float, to be odd
     by_size : bool, whether the others have the effect, too
     """
 
@@ -252,10 +257,9 @@ class Pass:
         What few sensors have makes these odd.
         """
         names = [name for name in self.posterior if name not in self._rare] if self.missing else []
-        sums = np.cumsum([self.posterior[name] for name in names[:MAX_NAMES]])
-        count = 1 + int(np.argmax(sums >= MIN_CERTAIN)) if names else 0
-        sure = count and sums[count - 1] >= RULES.sure
-        return self._effect(names[:count], float(sums[count - 1])) if sure else None
+        count = _count_certain([self.posterior[name] for name in names])
+        posterior = sum(self.posterior[name] for name in names[:count])
+        return self._effect(names[:count], posterior) if posterior >= RULES.sure else None
 
     @property
     def best(self) -> LotEffect:
@@ -314,17 +318,17 @@ class Pass:
         """Odd sensors, the surest first; 5 of 100 are expected to be wrong."""
         names = [name for name in self.mixture.own if name not in self._named]
         own = np.array([self.mixture.own[n] + np.log(self.mixture.prior[n]) for n in names])
+        own = special.softmax(own, axis=0)
         # Sensors of which nobody doubts it stay in their order.
         posterior = self.posterior_odd
         order = np.argsort(-np.round(posterior, 3), kind="stable")[: count_odd(posterior)]
-        return [
-            OddSensor(
-                self.evidence[i].campaign,
-                self.classes[names[own[:, i].argmax()]],
-                float(posterior[i]),
-            )
-            for i in order
-        ]
+        odd = list[OddSensor]()
+        for i in order:
+            first = np.argsort(-own[:, i], kind="stable")
+            first = first[: _count_certain(own[first, i])]
+            members = tuple(member for k in first for member in self.classes[names[k]])
+            odd.append(OddSensor(self.evidence[i].campaign, members, float(posterior[i])))
+        return odd
 
     @property
     def usual(self) -> list[int]:
@@ -351,6 +355,12 @@ def priors_of(names: Sequence[str]) -> dict[str, float]:
     counts = Counter(kinds.values())
     total = sum(WEIGHTS[kind] for kind in counts)
     return {name: WEIGHTS[kind] / counts[kind] / total for name, kind in kinds.items()}
+
+
+def _count_certain(posterior: Sequence[float] | Array) -> int:
+    """How many names, the most probable first, hold the truth for certain; 1 if too many would."""
+    sums = np.cumsum(posterior[:MAX_NAMES])
+    return 1 + int(np.argmax(sums >= MIN_CERTAIN)) if len(sums) else 0
 
 
 def _combined(evidence: Sequence[SensorEvidence]) -> list[float]:

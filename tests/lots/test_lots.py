@@ -9,8 +9,11 @@ from page_helpers import assert_sound, text_of
 
 import accelstudy as acs
 from accelstudy.approaches import get_approach
+from accelstudy.campaign.calibration.fit import fit_campaign
 from accelstudy.campaign.format import read_campaign, write_campaign
+from accelstudy.lots.calibration import _squared_error
 from accelstudy.lots.evidence import Sensor
+from accelstudy.lots.lot import extended
 from accelstudy.lots.sizes import LotResiduals
 from accelstudy.lots.type_parameter import TypeParameter
 from accelstudy.sensors.models import get_model
@@ -52,6 +55,27 @@ def test_the_scatter_of_a_type_is_found():
     assert (one.mean, one.scatter, one.sigma) == (2.0, 0.0, 0.5)
     assert one.scatter_ci95 == (0.0, np.inf)
     assert np.isnan(over_sensors(np.full(3, np.nan), np.full(3, np.nan)).mean)
+
+
+def test_the_tilt_error_without_an_effect_is_that_of_sensors_without_noise():
+    """Sensors whose coefficients are those of a type, with noise that hides them, and without."""
+    rng, base = np.random.default_rng(4), get_model("bias-scale-nonorthogonality")
+    whole = extended(base, ["thermal_bias"])
+    squares = np.empty((2, 30, 2))
+    for i in range(squares.shape[1]):
+        own = ", ".join(f"{size:.9f}" for size in rng.normal(3e-4, 1e-4, 3))
+        for k, (sigma, spread) in enumerate([("4 mm/s^2", 1e-4), ("1e-4 mm/s^2", 1.0)]):
+            campaign = acs.simulate_campaign(
+                seed=i, scheme="fibonacci-18", sigma=sigma, approach="gravity",
+                temperature=(5, 35), temperature_order="random", effects=(f"thermal_bias: {own}",),
+            )  # fmt: skip
+            known = {f"b_T_{axis}": (3e-4, spread) for axis in "xyz"}
+            squares[k, i] = _squared_error(fit_campaign(campaign, whole), base, known)
+    told, true = squares
+    assert told.min() > 0
+    error = (told - true).std(axis=0) / np.sqrt(len(told))
+    assert np.all(np.abs((told - true).mean(axis=0)) < STANDARD_ERRORS * error)
+    assert np.all(error < 0.15 * true.mean(axis=0))
 
 
 N_LOT = 6
