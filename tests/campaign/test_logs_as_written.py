@@ -213,6 +213,17 @@ def test_dates_that_do_not_tell_month_and_day_apart_are_named(tmp_path):
     assert "column when: dates as 3/1/2024" in said
 
 
+@pytest.mark.parametrize("name", ["SN", "serial", "Serial No.", "Seriennummer", "sensor_id"])
+def test_rows_of_several_sensors_are_refused(name):
+    """Sensors that were logged together would be taken for one whose readings are their mean."""
+    log = table().loc[lambda rows: rows.index.repeat(2)].assign(**{name: ["A7", "B2"] * N})
+    for settings in ({}, {"rate": 2 * HAND_RATE}, {"means": True}):
+        with refused(f"column {name} has A7, B2; give the rows of each"):
+            acs.find_holds(log, **settings)
+    one = acs.find_holds(log[log[name] == "B2"])
+    assert one.n_positions == HOLDS
+
+
 def test_a_rate_that_the_times_contradict_is_told():
     dated = table(time=START + pd.to_timedelta(TIME, "s"))
     named = table(names=("t_ms", "ax", "ay", "az"), time=1e3 * TIME)

@@ -45,6 +45,8 @@ _USUAL = {
     "vibration": r"vibration|vibration_mps2",
     "n_samples": r"n|n_samples|count",
     **{angle: rf"{angle}|{angle}_robot(_gon)?" for angle in ANGLES},
+    "serial": r"((sensor|device)_?)?(s_?n|(serial|serien)_?(no|nr|num(ber|mer)?)?)_?"
+    r"|(sensor|device)_?(id|no|nr|num(ber|mer)?|name)_?",
 }
 _LESS_USUAL = {
     "time": r"t|(.*_)?secs?|(date|sample|sensor|log)_?time|date|elapsed(_time)?",
@@ -90,8 +92,13 @@ def resolve_layout(
     Raises
     ------
     InputError
-        If the table lacks a force.
+        If the table lacks a force, or has rows of several sensors.
     """
+    for place in places_by_name(raw.names, "serial"):
+        sensors = raw.content.column(place).unique().drop_null().to_pylist()
+        if len(sensors) > 1:
+            each = f"column {raw.names[place]} has {short_list([*map(str, sensors)])}"
+            raise InputError(f"{raw.path}: {each}; give the rows of each sensor by themselves")
     if {"time", "rate"} <= given.keys():
         raise InputError(f"{raw.path}: give the rate or the column of time, not both")
     another = like is None or like.columns.get("fx") not in raw.names
