@@ -17,6 +17,7 @@ from accelstudy.diagnosis.evidence.candidates import UNKNOWN
 from accelstudy.diagnosis.evidence.noise import NOISES
 from accelstudy.diagnosis.evidence.size import Level
 from accelstudy.diagnosis.rules import RULES
+from accelstudy.diagnosis.space.hypotheses import OUTLIER
 from accelstudy.effects import get_effect
 from accelstudy.lots.evidence import NOISE_PRIORS, Sensor, SensorEvidence, lot_classes
 from accelstudy.lots.mixture import Mixture, log_odd
@@ -287,9 +288,9 @@ class Pass:
 
     @cached_property
     def _rare(self) -> set[str]:
-        """Classes that few sensors have, if the lot has them."""
-        effects = self.mixture.effects
-        return {name for name in effects if np.sum(effects[name].having > MIN_HAVING) <= self._few}
+        """Classes of no type: what few sensors have, if the lot has it, and bumped positions."""
+        having = {name: np.sum(e.having > MIN_HAVING) for name, e in self.mixture.effects.items()}
+        return {name for name, n in having.items() if n <= self._few or name == OUTLIER}
 
     # --- which sensors ----------------------------------------------------------------------
 

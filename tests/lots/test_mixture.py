@@ -7,6 +7,7 @@ import pytest
 from scipy import integrate, stats
 
 from accelstudy.diagnosis.evidence.size import SIZE_WEIGHTS, SIZES, Level, log_mean
+from accelstudy.diagnosis.space.hypotheses import OUTLIER
 from accelstudy.effects import get_effect
 from accelstudy.lots.evidence import SensorEvidence, lot_classes
 from accelstudy.lots.lot import LotDiagnosis, _settle
@@ -45,15 +46,15 @@ def mixture_of(odds, typical=()):
     return Mixture(dict.fromkeys(names, 1 / len(names)), own, dict(typical))
 
 
-def weighed(odds, rng):
+def weighed(odds, rng, names=NAMES):
     """A pass over sensors with these odds (n, 3), which have their p-values by simulation."""
     said = []
     for i, each in enumerate(odds):
-        known = dict(zip(NAMES, each.tolist(), strict=True))
-        chance = odds_of(rng.standard_normal((CHANCES, len(NAMES))))
+        known = dict(zip(names, each.tolist(), strict=True))
+        chance = odds_of(rng.standard_normal((CHANCES, len(names))))
         total, by_chance = log_mean(each), log_mean(chance)
         p = min((1 + np.sum(by_chance >= total)) / (1 + CHANCES), np.exp(-total))
-        said.append(SensorEvidence(f"sensor {i}", p, known, [(n,) for n in NAMES]))
+        said.append(SensorEvidence(f"sensor {i}", p, known, [(n,) for n in names]))
     return Pass((SENSOR,) * len(said), tuple(said))
 
 
@@ -259,6 +260,21 @@ def test_a_sensor_is_odd_though_a_second_one_shows_the_same_by_chance():
     one = weighed(odds, np.random.default_rng(6))
     assert one.found is None
     assert [(o.campaign, o.names) for o in one.odd] == [("sensor 9", (NAMES[1],))]
+
+
+def test_a_bumped_position_belongs_to_no_type_however_many_have_one():
+    odds = np.full((12, 3), -1.0)
+    odds[[2, 7, 9], 1] = 15.0
+    one = weighed(odds, np.random.default_rng(8), (NAMES[0], OUTLIER, NAMES[2]))
+    assert one.found is None
+    assert {o.campaign: o.names for o in one.odd} == {f"sensor {i}": (OUTLIER,) for i in (2, 7, 9)}
+
+
+def test_an_odd_sensor_has_the_names_between_which_its_campaign_does_not_decide():
+    odds = np.full((12, 3), -1.0)
+    odds[3, :2] = 20.0, 19.5
+    one = weighed(odds, np.random.default_rng(9))
+    assert [(o.campaign, o.names) for o in one.odd] == [("sensor 3", NAMES[:2])]
 
 
 def test_names_between_which_the_lot_does_not_decide_are_reported_as_one_set():
