@@ -126,9 +126,8 @@ class LotCalibration:
         for found in self.diagnosis.effects:
             p = max(float(found.having[i]), MIN_SHARE)
             for one in self.sizes(found):
-                known = one if one.informative.any() else replace(one, has=one.usual)
-                square = known.scatter**2 + known.sigma**2 + (1 - p) * known.mean**2
-                expected[one.name] = (p * known.mean, float(np.sqrt(p * square)))
+                square = one.scatter**2 + one.sigma**2 + (1 - p) * one.mean**2
+                expected[one.name] = (p * one.mean, float(np.sqrt(p * square)))
         return expected
 
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -45,13 +44,7 @@ def write_type(lot: LotCalibration, folder: Path) -> bool:
     model = lot.diagnosis.model
     lasting = [effect for effect in model.effects if not effect.sudden]
     wanted = {parameter.name for effect in lasting for parameter in effect.parameters}
-    # Of what none of the usual sensors has for sure, the campaigns of all tell; the next one may
-    # not have it, as of what belongs to a mounting.
-    parameters = {
-        name: one if one.informative.any() else replace(one, has=one.usual, stays=False)
-        for name, one in lot.parameters.items()
-        if name in wanted
-    }
+    parameters = {name: one for name, one in lot.parameters.items() if name in wanted}
     sheet = {**file_key(), **_sheet(lot, parameters).content}
     content = TypeFile.content({
         **sheet,

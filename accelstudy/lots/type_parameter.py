@@ -38,8 +38,9 @@ class TypeParameter:
 
     @cached_property
     def informative(self) -> NDArray[np.bool_]:
-        """Usual sensors that have it, and whose campaigns show it, (n,)."""
-        return self.usual & self.has & np.isfinite(self.values) & np.isfinite(self.sigmas)
+        """Usual sensors that have it, of those whose campaigns show it, (n,); all if none has."""
+        shown = self.usual & np.isfinite(self.values) & np.isfinite(self.sigmas)
+        return shown & self.has if (shown & self.has).any() else shown
 
     @cached_property
     def of_type(self) -> RandomEffects:
@@ -78,7 +79,8 @@ class TypeParameter:
     def in_all(self) -> bool:
         """Whether the next sensor has it, too: all that are usual and calibrated have it."""
         calibrated = self.usual & np.isfinite(self.values)
-        return self.stays and 1 < np.count_nonzero(self.informative) == np.count_nonzero(calibrated)
+        n = np.count_nonzero(self.informative & self.has)
+        return self.stays and 1 < n == np.count_nonzero(calibrated)
 
     def draw(self, ax: Axes) -> None:
         """Draw it for each sensor with its interval, the type as a band, and odd sensors."""

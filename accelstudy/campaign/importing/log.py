@@ -222,12 +222,10 @@ class Log:
         samples = self.samples[~lost] if lost.any() else self.samples
         if place is not None and (backward := np.diff(samples["time"]) <= 0).any():
             row = int(samples.index[1 + int(np.argmax(backward))])
-            moved = np.argsort(samples["time"], kind="stable") - np.arange(len(samples))
-            remedy = "the rate (`rate`) does without it"
-            if np.median(np.abs(moved)) > 1:  # neither jitter nor a wrong time here and there
-                remedy = "sort the rows by time, or, if its clock began anew, give `rate`"
-            where = self.describe(row, "time")
-            raise InputError(f"{self.path}: {where}, not after the row above; {remedy}")
+            raise InputError(
+                f"{self.path}: {self.describe(row, 'time')}, not after the row above; sort the "
+                "rows by time, or, if its clock is coarse or began anew, give `rate`"
+            )
         if lost.sum() > MAX_BAD_SHARE * len(lost):
             row = int(np.argmax(lost))
             hint = "; give the rate (`rate`) instead" if self.unreadable(row)[0] == "time" else ""
