@@ -20,9 +20,7 @@ import re
 import shlex
 import shutil
 from contextlib import chdir
-from pathlib import Path
 from pkgutil import resolve_name
-from tempfile import TemporaryDirectory
 from types import SimpleNamespace
 from unittest import mock
 
@@ -80,25 +78,34 @@ def section(sound, lines):
 
 
 def answer(sound, command, wrong=""):
-    """What a command prints in a copy of the folder, and what else it does that it must not."""
-    with TemporaryDirectory() as place:
-        here = Path(place) / "here"
-        shutil.copytree(sound, here)
-        words = [part for part in wrong.split(" && ") if not changed(here, part)]
-        before = content(here)
-        with chdir(here):
-            if command.startswith("acs."):
-                result = outcome(eval, command, {"acs": acs, "pd": pd})
-            else:
-                program, *words = shlex.split(command.replace("…", " ".join(words)))
-                result = call(*words) if program == "accelstudy" else outcome(parse, *words)
-        said = [f"! {line}\n" for line in result.stderr.splitlines()]
-        said += [f"> {line}\n" for line in result.stdout.splitlines()]
-        if result.exit_code != 2:
-            said.append(f"exit status {result.exit_code}: {result.exception!r}\n")
-        if content(here) != before:
-            said.append("files were written\n")
-        return SHORT.sub(r"\1, …", "".join(said))
+    """What a command prints in the folder, and what else it does that it must not.
+
+    Files that are changed for it are put back.
+    """
+    parts = wrong.split(" && ")
+    matches = [CHANGE.fullmatch(part) for part in parts]
+    paths = {sound / match[1] for match in matches if match}
+    originals = {path: path.read_bytes() for path in paths if path.exists()}
+    words = [part for part in parts if not changed(sound, part)]
+    before = content(sound)
+    with chdir(sound):
+        if command.startswith("acs."):
+            result = outcome(eval, command, {"acs": acs, "pd": pd})
+        else:
+            program, *words = shlex.split(command.replace("…", " ".join(words)))
+            result = call(*words) if program == "accelstudy" else outcome(parse, *words)
+    said = [f"! {line}\n" for line in result.stderr.splitlines()]
+    said += [f"> {line}\n" for line in result.stdout.splitlines()]
+    if result.exit_code != 2:
+        said.append(f"exit status {result.exit_code}: {result.exception!r}\n")
+    if content(sound) != before:
+        said.append("files were written\n")
+    for path in paths:
+        if path in originals:
+            path.write_bytes(originals[path])
+        else:
+            path.unlink(missing_ok=True)
+    return SHORT.sub(r"\1, …", "".join(said))
 
 
 def parse(function, file):

@@ -138,7 +138,8 @@ class _Rows:
             if len(lines) == 1:
                 raise InputError(f"{path}: no end of a line in {_PREVIEW} characters; is it text?")
             lines.pop()  # it may be cut
-        tables = [cls(lines, *layout) for layout in _LAYOUTS]
+        there = [layout for layout in _LAYOUTS if layout[0] is None or layout[0].encode() in text]
+        tables = [cls(lines, *layout) for layout in there]
         if any(table.delimiter == "\t" and table.many >= 3 for table in tables):
             # Tabs make a log of the rows already, so blanks are those of a note.
             tables = [table for table in tables if table.delimiter is not None]
