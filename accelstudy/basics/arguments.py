@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
+from io import IOBase
 from math import isfinite
 from numbers import Integral, Real
 from os import PathLike
@@ -12,7 +13,7 @@ from typing import Any
 
 from accelstudy.basics.bounds import Range
 from accelstudy.basics.errors import InputError, brief, locate_errors
-from accelstudy.basics.names import check_file_name
+from accelstudy.basics.names import check_file_name, matches
 from accelstudy.basics.units import InputQuantity
 
 
@@ -42,7 +43,8 @@ def whole_number(name: str, value: Any, allowed: Range) -> int:
 def quantity(name: str, value: Any, kind: InputQuantity) -> float:
     """Quantity in SI: a number in SI, or text with a unit, as on the command line."""
     if not isinstance(value, bool) and isinstance(value, Real) and isfinite(value):
-        value = f"{float(value)!r} {kind.unit}"  # the unit may begin with a digit, as 1/K does
+        # The unit may begin with a digit, as 1/K does.
+        value = f"{float(value)!r} {kind.unit}".removesuffix(" 1")
     check_type(name, value, str, expected=f"a number in {kind.unit} or a text with its unit")
     with locate_errors(name):
         return kind.read(value)
@@ -53,16 +55,36 @@ def tidy(value: float, digits: int = 12) -> float:
     return float(f"{value:.{digits}g}") + 0.0  # -0.0 becomes 0.0
 
 
+def plain(value: Any) -> Any:
+    """Scalar of NumPy as that of Python; anything else as it is."""
+    return value.item() if getattr(value, "shape", None) == () else value
+
+
 def as_sequence(value: Any) -> Sequence[Any]:
-    """One or several values as a sequence; a text is one."""
-    several = not isinstance(value, str | bytes | Mapping) and hasattr(value, "__iter__")
-    return tuple(value) if several else (value,)
+    """One or several values as a sequence; a text is one, and so is an open file."""
+    one = isinstance(value, str | bytes | Mapping | IOBase) or not hasattr(value, "__iter__")
+    return (value,) if one else tuple(map(plain, value))
 
 
-def check_once(paths: Sequence[Any], what: str) -> None:
-    """Raise `InputError` if a path is given twice of which each stands for one thing."""
+def paths_of(given: Any, what: str, wanted: Callable[[str], bool]) -> list[Any]:
+    """Paths in place of the patterns that they match; anything else stands for itself.
+
+    Raises
+    ------
+    InputError
+        If there is none, or a path is given twice, of which each stands for one thing.
+    """
+    each: list[Any] = []
+    for one in as_sequence(given):
+        matching = matches(Path(one), wanted) if isinstance(one, str | PathLike) else None
+        if matching == []:
+            raise InputError(f"{one}: no {what} there")
+        each += [one] if matching is None else map(Path, matching)
+    if not each:
+        raise InputError(f"expected one {what} or several")
     seen = set()
-    for path in (one for one in paths if isinstance(one, str | PathLike)):
+    for path in (one for one in each if isinstance(one, str | PathLike)):
         if (place := Path(path).resolve()) in seen:
             raise InputError(f"{path}: is given twice; each {what} counts once")
         seen.add(place)
+    return each

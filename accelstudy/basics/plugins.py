@@ -18,9 +18,10 @@ from contextlib import contextmanager
 from functools import cache, lru_cache
 from importlib.metadata import EntryPoint, entry_points
 from importlib.util import find_spec
+from itertools import chain
 from pathlib import Path
 from types import ModuleType
-from typing import Any, NamedTuple, TypeVar
+from typing import Any, TypeVar
 
 from accelstudy.basics.errors import InputError, locate_errors, reason_of
 from accelstudy.basics.names import check_file_name
@@ -28,24 +29,17 @@ from accelstudy.basics.names import check_file_name
 PREFIX = "accelstudy."
 """What the groups of entry points begin with; the name of a room follows."""
 NOTHING = "registers nothing; expected a class or a function under @register"
-HOW = "; of a plug-in: name its file with --plugin or, in a configuration, under plugins"
+HOW = "; of a plug-in: import it, name it with --plugin or, in a configuration, under plugins"
 """What a message adds to the names that are known."""
 _CODE = (".py", ".yaml", ".yml", ".json", ".j2")
-
-
-class Source(NamedTuple):
-    """Where registered code is: the name of its plug-in, and its own name there."""
-
-    plugin: str
-    code: str
 
 
 _files: dict[str, str] = {}
 """Digest by name, of the files that are loaded."""
 _loading: list[str] = []
 """Names of the plug-ins that are being loaded, the innermost last."""
-_sources: dict[tuple[str, str], Source] = {}
-"""Source by kind and name of what plug-ins registered."""
+_sources: dict[tuple[str, str], tuple[str, str]] = {}
+"""Plug-in, and name of the code in it, by kind and name of what it registered."""
 _lookups: list[Any] = []
 """Caches of what is looked up by name."""
 
@@ -58,37 +52,32 @@ def cached_lookup(function: Lookup) -> Lookup:
     return _lookups[-1]
 
 
-def is_plugin(code: Any) -> bool:
-    """Whether a class or function is not of this package."""
-    return not code.__module__.startswith(PREFIX)
-
-
-def is_known(kind: str, name: str, code: Any) -> bool:
-    """Whether a name is that of the same code, which was changed or is imported once more."""
-    return _sources.get((kind, name)) == _source(code)
-
-
 def note_registration(kind: str, name: str, code: Any) -> None:
     """Note what code of a plug-in registers."""
-    source = _sources[kind, name] = _source(code)
-    if not _loading and os.path.isfile(source.plugin):  # an imported file
-        _files[source.plugin] = _digest(Path(source.plugin).read_bytes())
+    _sources[kind, name] = plugin, _ = find_source(code)
+    if not _loading and os.path.isfile(plugin):  # an imported file
+        _files[plugin] = _digest(Path(plugin).read_bytes())
     for lookup in _lookups:
         lookup.cache_clear()
 
 
-def _source(code: Any) -> Source:
-    """Source of a class or function: what is being loaded, or else its file, package or module."""
+def find_source(code: Any) -> tuple[str, str]:
+    """Plug-in of a class or function, empty if it is of this package, and its name in it.
+
+    That is what is being loaded, or else its package, its file or, of a notebook, its module.
+    """
     module = code.__module__
+    if module.startswith(PREFIX):
+        return "", ""
     installed = (label(point) for point in _entry_points(tuple(sys.path)) if point.module == module)
     file = getattr(sys.modules.get(module), "__file__", None)
     files = [os.path.relpath(file)] if file else []
-    return Source([*_loading[-1:], *installed, *files, module][0], code.__qualname__)
+    return next(chain(_loading[-1:], installed, files, [module])), code.__qualname__
 
 
-def source_of(kind: str, name: str) -> str:
-    """Return the name of the plug-in that something is of; empty if it is of accelstudy."""
-    return _sources.get((kind, name), Source("", "")).plugin
+def source_of(kind: str, name: str) -> tuple[str, str]:
+    """Return the source of what is registered; its plug-in is empty if it is of accelstudy."""
+    return _sources.get((kind, name), ("", ""))
 
 
 def load_files(paths: Iterable[str | Path]) -> None:
@@ -251,7 +240,7 @@ def _registering(name: str) -> Iterator[None]:
         yield
     finally:
         _loading.pop()
-    if all(source.plugin != name for source in _sources.values()):
+    if all(plugin != name for plugin, _ in _sources.values()):
         raise InputError(NOTHING)
 
 

@@ -13,7 +13,7 @@ from pkgutil import iter_modules
 from typing import Any, ClassVar, Generic, Self, TypeVar
 
 from accelstudy.basics import plugins
-from accelstudy.basics.errors import InputError, UnknownNameError, check_name
+from accelstudy.basics.errors import InputError, UnknownNameError, check_name, locate_errors
 
 Item = TypeVar("Item")
 Kind = TypeVar("Kind", bound=type[Any])
@@ -49,10 +49,11 @@ class Registry(Generic[Item]):
             If its name is taken, or it is of a plug-in and cannot be used.
         """
         code = code or type(item)
-        if name in self._items and not plugins.is_known(self.kind, name, code):
+        plugin = plugins.find_source(code)
+        if name in self._items and not (plugin[0] and plugin == plugins.source_of(self.kind, name)):
             raise InputError(f"the {self.kind} {name!r} is there already; choose another name")
-        if plugins.is_plugin(code):
-            with plugins.error_as_line(f"{self.kind} {name!r}"):
+        if plugin[0]:
+            with locate_errors(f"{self.kind} {name!r}"):
                 _check_complete(item)
                 if self._check:
                     self._check(item)

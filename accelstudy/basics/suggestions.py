@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import shlex
+from functools import partial
 from pathlib import Path
 
 from accelstudy.basics.names import MAX_NAME_BYTES
@@ -24,20 +25,6 @@ def export(form: str, calibration: str | Path) -> str:
     return _line("export", Path(calibration), "--form", form)
 
 
-def calibrate(
-    campaign: str | Path, model: str | Path, approach: str, prior: str | Path | None = None
-) -> str:
-    """Calibrate a campaign."""
-    return _of_campaign("calibrate", campaign, model, approach, prior, "calibrated")
-
-
-def diagnose(
-    campaign: str | Path, model: str | Path, approach: str, prior: str | Path | None = None
-) -> str:
-    """Find what a model lacks to explain a campaign."""
-    return _of_campaign("diagnose", campaign, model, approach, prior, "diagnosis")
-
-
 def new_name(folder: str | Path, what: str) -> Path:
     """Name in the current folder for what comes of a folder.
 
@@ -52,11 +39,11 @@ def new_name(folder: str | Path, what: str) -> Path:
 
 def _of_campaign(
     command: str,
+    what: str,
     campaign: str | Path,
     model: str | Path,
     approach: str,
-    prior: str | Path | None,
-    what: str,
+    prior: str | Path | None = None,
 ) -> str:
     path, chosen = Path(campaign), ["--model", model, "--approach", approach]
     if prior is not None:
@@ -65,6 +52,10 @@ def _of_campaign(
     if Path.cwd().is_relative_to(path.resolve()):  # nothing is written into a campaign
         out = path / os.pardir / new_name(path.resolve().name, what)
     return _line(command, path, *chosen, "--out", out)
+
+
+calibrate = partial(_of_campaign, "calibrate", "calibrated")
+diagnose = partial(_of_campaign, "diagnose", "diagnosis")
 
 
 def _line(*parts: str | Path) -> str:

@@ -14,6 +14,7 @@ from matplotlib.axes import Axes
 
 from accelstudy.approaches import Approach
 from accelstudy.basics import suggestions
+from accelstudy.basics.arguments import path_of
 from accelstudy.basics.errors import InputError
 from accelstudy.basics.levels import ACCEPTED, BLIND, IMPLAUSIBLE, REJECTED, UNCHECKED
 from accelstudy.basics.names import distinct, path_name
@@ -97,7 +98,11 @@ class Batch(Result):
         self.calibrations: dict[str, Calibration] = {}
         self.failed: dict[str, str] = {}
         self._chosen = {"model": model.name, "approach": approach and approach.name}
-        paths = [one.name if isinstance(one, Campaign) else one for one in campaigns]
+        expected = "Campaigns or their folders"
+        paths = [
+            one.name if isinstance(one, Campaign) else path_of("campaigns", one, expected)
+            for one in campaigns
+        ]
         names = [path_name(Path(os.path.abspath(path)).name, "campaign") for path in paths]
         self.sources.update(zip(distinct(names), map(os.path.normpath, paths), strict=True))
         each = zip(track(campaigns, "campaigns"), self.sources.items(), strict=True)

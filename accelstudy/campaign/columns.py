@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from accelstudy.basics import bounds
 from accelstudy.basics.bounds import Range
-from accelstudy.basics.errors import InputError
+from accelstudy.basics.errors import InputError, check_name
 
 MAX_CELL = 1e12
 """Larger than any measured value in any unit; squares and cubes of smaller ones stay finite."""
@@ -80,6 +80,10 @@ def table_of(arrays: Mapping[str, Any]) -> pd.DataFrame:
 
     Without positions the holds are numbered from 1 on. Errors as of `split`.
     """
+    for name in arrays:
+        check_name("array of a campaign", name, COLUMNS)
+    if arrays.get("forces") is None:
+        raise InputError("forces: missing; a campaign has one of each position")
     n = len(arrays["forces"])
     given = {name: arrays[name] for name in COLUMNS if arrays.get(name) is not None}
     positions = given.pop("positions", np.arange(1, n + 1))
@@ -95,10 +99,15 @@ def split(attribute: str, values: Any, n: int) -> dict[str, NDArray[Any]]:
     Raises
     ------
     InputError
-        If the array has another shape than (n,), or (n, k) for k columns.
+        If the array has another shape than (n,), or (n, k) for k columns, a value that is no
+        number, or times that decrease.
     """
     names = COLUMNS[attribute].names
     shape = (n, len(names)) if len(names) > 1 else (n,)
     if np.shape(values) != shape:
         raise InputError(f"{attribute}: shape {np.shape(values)}, not {shape}")
+    if (array := np.asarray(values)).dtype.kind not in "iuf" or not np.isfinite(array).all():
+        raise InputError(f"{attribute}: expected finite numbers")
+    if attribute == "time" and (np.diff(array) < 0).any():
+        raise InputError("time: decreases; holds must be in order of acquisition")
     return dict(zip(names, np.reshape(values, (n, len(names))).T, strict=True))

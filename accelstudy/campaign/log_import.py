@@ -12,9 +12,8 @@ from typing import TYPE_CHECKING, Any
 
 import pandas as pd
 
-from accelstudy.basics.arguments import as_sequence, path_of
-from accelstudy.basics.errors import InputError
-from accelstudy.basics.names import matches, natural
+from accelstudy.basics.arguments import as_sequence, path_of, paths_of
+from accelstudy.basics.names import natural
 from accelstudy.basics.progress import say, show, warn
 from accelstudy.basics.wording import plural
 from accelstudy.campaign.format import write_campaign
@@ -92,19 +91,13 @@ def files_of(given: Iterable[str | PathLike[str]]) -> list[Path]:
     Raises
     ------
     InputError
-        If there is none.
+        If there is none, or one is given twice.
     """
-    files: list[Path] = []
+    patterns: list[Path] = []
     for path in (path_of("log", one, "a path, or one DataFrame outside a list") for one in given):
         is_folder = path.is_dir() and not (path / BAG_OF_FOLDER).is_file()
-        found = matches(Path(escape(str(path)), "*") if is_folder else path, os.path.isfile)
-        inside = [path] if found is None else [*map(Path, found)]
-        if not inside:
-            raise InputError(f"{path}: no file there")
-        files += inside
+        patterns.append(Path(escape(str(path)), "*") if is_folder else path)
+    files: list[Path] = paths_of(patterns, "file", os.path.isfile)
     if files == sorted(files):
         files.sort(key=natural)
-    twice = [path for path in files if files.count(path) > 1]
-    if twice:
-        raise InputError(f"{twice[0]}: the file is given twice")
     return files

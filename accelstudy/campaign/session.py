@@ -11,6 +11,7 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
+from accelstudy.basics.arrays import CachedTable
 from accelstudy.basics.errors import InputError
 from accelstudy.basics.wording import plural
 from accelstudy.campaign.columns import COLUMNS, split, table_of
@@ -63,7 +64,7 @@ class Campaign:
     """
 
     header: Header
-    holds: pd.DataFrame
+    holds: CachedTable = CachedTable()  # noqa: RUF009
     warnings: tuple[str, ...] = ()
     notes: tuple[str, ...] = ()
     sensor_type: SensorType | None = None
@@ -79,7 +80,8 @@ class Campaign:
 
         Parameters
         ----------
-        content : mapping, keys and values of `campaign.yaml`; at least `name` and `gravity`
+        content : mapping, keys and values of `campaign.yaml`; at least `name` and `gravity`, as
+            ``{"name": "mine", "gravity": {"value_mps2": 9.81}}``
         arrays : in SI, by the names of the attributes: `forces`, and perhaps others
 
         Raises

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import inspect
 import math
-from collections.abc import Collection, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass, field, fields
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -225,9 +225,7 @@ class DataSheet(Result):
         drift = (self.bias_rate or 0.0) * seconds
         return math.hypot(floor, walk, drift, again)
 
-    def temperature_sigmas(
-        self, kelvin: float, corrected: Collection[str] = ()
-    ) -> tuple[float, float]:
+    def temperature_sigmas(self, kelvin: float) -> tuple[float, float]:
         """Standard deviations of what a temperature changes: of the bias, m/s², and of the scale.
 
         Coefficients that are unknown count as zero.
@@ -235,11 +233,10 @@ class DataSheet(Result):
         Parameters
         ----------
         kelvin : float, K, difference from the temperature of the calibration
-        corrected : those of "bias" and "scale" whose change is known and corrected
         """
-        bias = 0.0 if "bias" in corrected else (self.bias_per_kelvin or 0.0) * abs(kelvin)
-        scale = 0.0 if "scale" in corrected else (self.scale_per_kelvin or 0.0) * abs(kelvin)
-        return bias, scale
+        return (self.bias_per_kelvin or 0.0) * abs(kelvin), (self.scale_per_kelvin or 0.0) * abs(
+            kelvin
+        )
 
     @property
     def quadratic_scale(self) -> float | None:

@@ -12,8 +12,7 @@ from accelstudy.adjustment.quality import noncentrality, solve
 from accelstudy.approaches import Approach
 from accelstudy.basics.arrays import Array
 from accelstudy.basics.shares import sigmas_95
-from accelstudy.basics.units import display_unit
-from accelstudy.basics.wording import amount
+from accelstudy.basics.units import display_unit, to_display
 from accelstudy.campaign.calibration.fit import fit_campaign
 from accelstudy.campaign.session import Campaign
 from accelstudy.diagnosis.file_format import UpperLimit
@@ -178,8 +177,8 @@ def visibility_table(frame: SessionFit) -> pd.DataFrame:
                 "effect": row.name,
                 "part": effect.part,
                 "status": row.status,
-                "MDB": amount(row.mdb, unit) if seen else "–",
-                "MIB": amount(row.mib, unit) if seen else "–",
+                "MDB": float(f"{to_display(row.mdb, unit):.3g}") if seen else np.nan,
+                "MIB": float(f"{to_display(row.mib, unit):.3g}") if seen else np.nan,
                 "unit": display_unit(unit) if seen else "",
                 "with": "" if row.easiest is None else settings_text(row.easiest),
                 "confused with": row.reason or near,

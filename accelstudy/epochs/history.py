@@ -90,7 +90,7 @@ class History(Result):
         """
         if (n := len(calibrations)) < 2 or (accuracy is not None and n < MIN_COURSE):
             least = "two or more" if accuracy is None else "three or more to tell an interval"
-            raise InputError(f"CALIBRATION: a history has {least}, not {n}")
+            raise InputError(f"a history has {least}, not {n}")
         if dates and len(set(dates)) < 2 and n >= MIN_COURSE:
             raise InputError(f"{key('dates')}: all are the same; a rate needs two dates or more")
         order = sorted(range(n), key=dates.__getitem__) if dates else range(n)
@@ -355,7 +355,7 @@ def _check_alike(calibrations: Sequence[SensorCalibration]) -> None:
         elif {*own} != {*names}:
             why = (
                 f"effects: {comma_list(own)}, but {comma_list(names)} in the first calibration; "
-                "calibrate both campaigns with one `--model`"
+                "calibrate both campaigns with one model"
             )
         else:
             continue

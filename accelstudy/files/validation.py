@@ -23,7 +23,7 @@ from pydantic import (
     model_validator,
 )
 from pydantic import GetJsonSchemaHandler as JsonHandler
-from pydantic_core import ErrorDetails, core_schema
+from pydantic_core import ErrorDetails, PydanticCustomError, core_schema
 
 from accelstudy.basics import bounds
 from accelstudy.basics.bounds import Range
@@ -183,6 +183,8 @@ class ConfigSection(DocumentedModel):
         known = [field.alias or name for name, field in fields.items()]
         other = [field.validation_alias for field in fields.values()]
         before = [name for one in other if isinstance(one, AliasChoices) for name in one.choices]
+        if not isinstance(content, Mapping | cls):
+            raise PydanticCustomError("keys", f"{_KEYS} ({', '.join(known)})")
         for key in content if isinstance(content, Mapping) else ():
             if key in cls.retired:
                 raise KeyProblem(f"{key}: no longer a key; {cls.retired[key]}")

@@ -108,7 +108,7 @@ class Lot(Result):
                 left_out[own] = str(error)
         if len(usable) < MIN_SENSORS:
             why = next(iter(left_out.values()), "")
-            raise InputError(why or "CAMPAIGN: a lot has two sensors or more; `diagnose` takes one")
+            raise InputError(why or "a lot has two sensors or more; `diagnose` takes one")
         for name, why in left_out.items():
             say(f"not in the lot: {name}: {why.removeprefix(f'{name}: ')}")
         diagnosis = weigh_lot(usable, model, approach, seed, cores)

@@ -112,11 +112,12 @@ class Result(ABC):
     def summary(self) -> str:
         """Return a report as text: state, verdict and the main table."""
         head = f"{type(self).__name__} of {self.name}: {self.state}"
-        return f"{head}\n{self.verdict}\n\n{self._table()}"
+        return f"{head}\n{self.verdict}\n\n{self._table()}".rstrip()
 
     def _table(self) -> str:
         """Return the main table as text."""
-        return self.to_frame().to_string(float_format="{:.5g}".format, na_rep="–")
+        table = self.to_frame()
+        return "" if table.empty else table.to_string(float_format="{:.5g}".format, na_rep="–")
 
     def __repr__(self) -> str:
         return f"{type(self).__name__}({self.name!r}, {self.state})"

@@ -38,8 +38,9 @@ class _Entry:
         if match is None:
             return None
         numbers = [int(group) for group in match.groups()]
+        built = self.build(*numbers)
         try:
-            directions = unit_vectors(self.build(*numbers))
+            directions = unit_vectors(built)
         except ValueError as error:
             raise InputError(f"scheme {name!r}: {error}") from None
         title = f"{len(directions)} {self.title.format(*numbers)}"

@@ -16,6 +16,7 @@ from matplotlib.axes import Axes
 
 from accelstudy.approaches import get_approach
 from accelstudy.basics.arguments import as_sequence, check_type, quantity, tidy
+from accelstudy.basics.arrays import CachedTable
 from accelstudy.basics.errors import InputError, check_name
 from accelstudy.basics.units import MGON, InputQuantity, display_unit, to_display
 from accelstudy.basics.wording import plural
@@ -256,7 +257,7 @@ class Simulation(Result):
         table = pd.concat(each, keys=[cell.name for cell in self.cells], names=["cell"])
         return table.droplevel("cell") if len(each) == 1 else table
 
-    @cached_property
+    @CachedTable
     def estimates(self) -> pd.DataFrame:
         """Every calibration, SI: a row for each cell, replicate and parameter.
 

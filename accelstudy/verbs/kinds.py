@@ -22,7 +22,14 @@ import click
 from click.shell_completion import CompletionItem
 
 from accelstudy.basics import bounds
-from accelstudy.basics.arguments import as_sequence, check_type, path_of, quantity, whole_number
+from accelstudy.basics.arguments import (
+    as_sequence,
+    check_type,
+    path_of,
+    plain,
+    quantity,
+    whole_number,
+)
 from accelstudy.basics.bounds import Range
 from accelstudy.basics.errors import OPTIONS, InputError, brief, key
 from accelstudy.basics.levels import MAX_TILT_GON
@@ -154,7 +161,7 @@ def pairs(example: str) -> Kind:
 
     def read(name: str, value: Any) -> dict[str, Any]:
         if isinstance(value, Mapping):
-            return dict(value)
+            return {key: plain(said) for key, said in value.items()}
         check_type(name, value, str, expected=f"a mapping, or a text as {example}")
         pairs = [part.split("=", 1) for part in value.split(",")]
         if any(len(pair) != 2 for pair in pairs):
@@ -309,6 +316,7 @@ class Keyword:
 
     def check(self, value: Any) -> Any:
         """Value as the verb works with it, quantities in SI; raises `InputError` if it is wrong."""
+        value = plain(value)
         if self.optional and (value is None or (self.kind.name == "quantity" and value == "none")):
             return None
         if not (self.many or self.ends):

@@ -3,16 +3,13 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from datetime import date
 from os import PathLike
-from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated
 
-from accelstudy.basics.arguments import as_sequence, check_once
+from accelstudy.basics.arguments import paths_of
 from accelstudy.basics.bounds import Range
-from accelstudy.basics.errors import InputError
-from accelstudy.basics.names import matches
 from accelstudy.verbs import kinds
 from accelstudy.verbs.kinds import verb
 
@@ -58,7 +55,7 @@ def compare(
     from accelstudy.campaign.calibration.sensor_calibration import sensor_of
     from accelstudy.epochs.history import History, dates_of
 
-    check_once((first, second), "calibration")
+    paths_of((first, second), "calibration", os.path.exists)
     sensors = sensor_of(first, "first"), sensor_of(second, "second")
     # The range is in SI by `verb`.
     return History(sensors, dates_of(sensors, (), ("first", "second")), float(tilt_range))
@@ -113,7 +110,7 @@ def history(
     from accelstudy.campaign.calibration.sensor_calibration import sensor_of
     from accelstudy.epochs.history import History, check_different, dates_of
 
-    calibrations = paths(calibrations, "calibration", os.path.exists)
+    calibrations = paths_of(calibrations, "calibration", os.path.exists)
     sensors, names = [sensor_of(one) for one in calibrations], [*map(str, calibrations)]
     check_different(sensors, names)
     dated = dates_of(sensors, dates, names)
@@ -159,7 +156,7 @@ def lot(
     from accelstudy.lots.output import Lot
     from accelstudy.verbs.inputs import as_campaign, model_and_approach
 
-    measured = [as_campaign(one) for one in paths(campaigns, "sensor", os.path.isdir)]
+    measured = [as_campaign(one) for one in paths_of(campaigns, "sensor", os.path.isdir)]
     return Lot.of(measured, *model_and_approach(model, approach), seed, cores)
 
 
@@ -194,16 +191,6 @@ def batch(
     from accelstudy.campaign.batch import Batch
     from accelstudy.verbs.inputs import model_and_approach
 
-    return Batch(paths(campaigns, "campaign", os.path.isdir), *model_and_approach(model, approach))
-
-
-def paths(given: Any, what: str, wanted: Callable[[str], bool]) -> list[Any]:
-    """Paths in place of the patterns that they match; anything else stands for itself, once."""
-    each: list[Any] = []
-    for one in as_sequence(given):
-        matching = matches(Path(one), wanted) if isinstance(one, str | PathLike) else None
-        if matching == []:
-            raise InputError(f"{one}: no {what} there")
-        each += [one] if matching is None else map(Path, matching)
-    check_once(each, what)
-    return each
+    return Batch(
+        paths_of(campaigns, "campaign", os.path.isdir), *model_and_approach(model, approach)
+    )

@@ -63,7 +63,7 @@ def _effect(item: Effect | NoiseEffect) -> Row:
     else:
         first = [f"{s.name} {_ends(item.typical)} {_unit(s.unit)}" for s in item.takes[:1]]
         row |= {"part": "noise", "typical": "".join(first).rstrip()}
-    return row | {"settings": "; ".join(settings), "plugin": source_of(item.kind, item.name)}
+    return row | {"settings": "; ".join(settings), "plugin": source_of(item.kind, item.name)[0]}
 
 
 def _ends(ends: Iterable[float]) -> str:
@@ -171,9 +171,10 @@ def directions(name: str) -> pd.DataFrame:
     scheme = get_scheme(name)
     attitudes = units.to_attitude(angles_of(-scheme.directions))
     columns = ["x", "y", "z", *(f"{angle}_{units.attitude_unit()}" for angle in ("roll", "pitch"))]
-    table = pd.DataFrame(np.hstack([scheme.directions, attitudes]), columns=columns)
+    numbers = pd.RangeIndex(1, scheme.n_positions + 1, name="position")
+    table = pd.DataFrame(np.hstack([scheme.directions, attitudes]), numbers, columns)
     table.attrs["title"] = f"{scheme.title} ({scheme.status}): {scheme.source}"
-    return table.rename_axis("position")
+    return table
 
 
 def cell_table(configurations: Sequence[str | PathLike[str]]) -> pd.DataFrame:

@@ -26,9 +26,9 @@ class Plan(ConfigSection):
     ({"grid": {"sise": 1, "size": 1}}, "grid.sise", "unknown key; did you mean 'size'? (known:"),
     ({}, "grid", "must be given"),
     ({"gird": {"size": 1}}, "gird", "unknown key; did you mean 'grid'? (known:"),
-    ({"grid": [1]}, "grid", "expected keys and values, not [1]"),
+    ({"grid": [1]}, "grid", "expected keys and values (size), not [1]"),
     ({"grid": {"size": 0}, "names": 3}, "grid.size", "names)"),
-    (3, "", "expected keys and values, not 3"),
+    (3, "", "expected keys and values (grid, names), not 3"),
 ])  # fmt: skip
 def test_an_error_is_one_line_with_source_and_key(content, key, said):
     with refused(said, start=f"plan.yaml: {key}{': ' if key else ''}"):

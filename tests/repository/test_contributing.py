@@ -43,7 +43,7 @@ def added(tmp_path_factory):
     ("figure", "tilt-over-condition", "study/figures"),
 ])  # fmt: skip
 def test_each_checklist_has_one_new_file(kind, name, room):
-    path = plugins.source_of(kind, name)
+    path, _ = plugins.source_of(kind, name)
     assert path.rpartition("/")[0] == f"accelstudy/{room}"
     assert not (ROOT / path).exists()
     for words in (["check"], ["format", "--check"]):

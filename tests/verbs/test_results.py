@@ -1,5 +1,6 @@
 """What verbs return: it says, shows, draws and saves itself, and is what the command gives."""
 
+import io
 import json
 import pickle
 import sys
@@ -230,3 +231,69 @@ def test_the_front_door_is_light_and_complete():
     for name in acs.__all__:
         assert getattr(acs, name).__doc__
         assert f" import {name} as {name}\n" in source
+
+
+@pytest.mark.parametrize("table", ["campaign.holds", "log.samples", "calibration.residuals",
+                                   "diagnosis.positions", "result.estimates"])  # fmt: skip
+def test_a_table_that_was_read_is_not_changed_by_its_reader(guide, table):
+    name, _, attribute = table.partition(".")
+    before = getattr(guide[name], attribute)
+    changed = getattr(guide[name], attribute)
+    changed.iloc[0, 1] = 0
+    changed["new"] = 1
+    pd.testing.assert_frame_equal(getattr(guide[name], attribute), before)
+
+
+# --- what a program gives ------------------------------------------------------------------------
+
+
+def test_numbers_may_be_those_of_numpy(guide):
+    campaign = acs.simulate_campaign(sigma=np.array(0.003), sigma_known=np.True_)
+    assert campaign.sigma_force == 0.003
+    intervals = guide["calibration"].intervals
+    assert intervals(np.float32(0.5)).equals(intervals("50%"))
+    dates = np.array(["2025-01-01", "2026-01-01"], "datetime64[D]")
+    both = [acs.calibrate(acs.simulate_campaign(seed=seed)) for seed in (1, 2)]
+    assert [date.year for date in acs.history(both, dates=dates).dates] == [2025, 2026]
+
+
+def test_names_of_columns_in_memory_may_be_numbers():
+    table = logged().set_axis([3, 1, 0], axis=1)
+    by_name = acs.read_log(table, rate=100, columns={"fx": 3, "fy": np.int64(1), "fz": 0})
+    assert by_name.samples[["fx", "fy", "fz"]].to_numpy() == pytest.approx(table.to_numpy())
+
+
+def test_durations_are_times():
+    table = logged()
+    table["time"] = pd.to_timedelta(np.arange(len(table)) / 100, unit="s")
+    assert acs.read_log(table).samples["time"].iloc[-1] == pytest.approx(len(table) / 100 - 0.01)
+
+
+@pytest.mark.parametrize(("verb", "given", "message"), [
+    (acs.find_holds, io.StringIO("fx,fy,fz\n" * 30000), "log: expected a path"),
+    (acs.batch, [], "expected one campaign or several"),
+    (acs.batch, [{}], "campaigns: expected Campaigns or their folders, not {}"),
+])  # fmt: skip
+def test_what_cannot_be_given_is_one_line(verb, given, message):
+    with pytest.raises(acs.InputError, match=f"^{message}"):
+        verb(given)
+
+
+@pytest.mark.parametrize(("arrays", "message"), [
+    ({"force": np.eye(3)}, "unknown array of a campaign 'force'; did you mean 'forces'"),
+    ({"time": [1, 2, 3]}, "forces: missing"),
+    ({"forces": np.diag([1, 1, np.nan])}, "forces: expected finite numbers"),
+    ({"forces": np.eye(3), "time": [2, 1, 3]}, "time: decreases"),
+])  # fmt: skip
+def test_a_campaign_of_arrays_is_checked(arrays, message):
+    with pytest.raises(acs.InputError, match=f"^{message}"):
+        acs.Campaign.of({"name": "mine", "gravity": {"value_mps2": 9.81}}, **arrays)
+
+
+def test_a_section_says_which_keys_it_has():
+    with pytest.raises(acs.InputError, match=r"^mine: gravity: .*\(value_mps2, sigma_mps2\)"):
+        acs.Campaign.of({"name": "mine", "gravity": 9.81}, forces=np.eye(3))
+
+
+def test_a_summary_has_no_empty_table(guide):
+    assert guide["diagnosis"].summary().endswith(guide["diagnosis"].verdict)

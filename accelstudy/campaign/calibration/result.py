@@ -12,7 +12,8 @@ import pandas as pd
 from matplotlib.axes import Axes
 
 import accelstudy
-from accelstudy.basics.arguments import check_type, quantity
+from accelstudy.basics.arguments import plain, quantity
+from accelstudy.basics.arrays import CachedTable
 from accelstudy.basics.errors import InputError
 from accelstudy.basics.levels import MAX_TILT_GON, REFUTATION_LEVEL
 from accelstudy.basics.progress import say, show, warn
@@ -36,6 +37,7 @@ from accelstudy.pages.result import Result
 from accelstudy.sensors.frames import axes_note
 
 TILT = InputQuantity("rad", 1e-3, np.pi / 2)
+LEVEL = InputQuantity("1", 0.0, 1.0, bare=True)
 MAX_ROWS = 200
 """Positions up to which the page lists all of them; of more, those that fit worst."""
 
@@ -111,7 +113,7 @@ class Calibration(Result):
         values = np.array(self.content[key], dtype=float)  # None becomes NaN
         return pd.DataFrame(values, index=names, columns=names)
 
-    def intervals(self, level: float = 0.95) -> pd.DataFrame:
+    def intervals(self, level: float | str = 0.95) -> pd.DataFrame:
         """Return the interval of each parameter that holds it with a probability, SI.
 
         It is that of the normal distribution where the noise is known, and of Student's t where it
@@ -119,7 +121,7 @@ class Calibration(Result):
 
         Parameters
         ----------
-        level : float, between 0 and 1
+        level : float or str, between 0 and 1, as 0.95 or 95%
 
         Returns
         -------
@@ -128,14 +130,12 @@ class Calibration(Result):
         """
         from scipy import stats
 
-        check_type("level", level, float, expected="a probability between 0 and 1")
-        if not 0 < level < 1:
-            raise InputError(f"level: expected a probability between 0 and 1, not {level:g}")
-        half = stats.t.ppf((1 + level) / 2, self.sensor.dof) * self.parameters["sigma"]
+        share = quantity("level", plain(level), LEVEL)
+        half = stats.t.ppf((1 + share) / 2, self.sensor.dof) * self.parameters["sigma"]
         value, unit = self.parameters["value"], self.parameters["unit"]
         return pd.DataFrame({"low": value - half, "high": value + half, "unit": unit})
 
-    @cached_property
+    @CachedTable
     def residuals(self) -> pd.DataFrame:
         """Residuals, tests and reliability of each position, as positions.parquet has them."""
         return assessed_positions(self._fitted("residuals"))

@@ -200,24 +200,24 @@ def _find(raw: RawTable, key: str, column: Place | None = None) -> int | None:
     InputError
         If the column that is given does not exist.
     """
-    names, by_text = raw.names, raw.named and isinstance(column, str)
+    names, said = raw.names, str(column)
     if column is None:
         places = time_columns(raw) if key == "time" else places_by_name(names, key)
-    elif by_text and column in names:
-        if names.count(str(column)) > 1:
+    elif raw.named and said in names:
+        if names.count(said) > 1:
             raise InputError(f"{raw.path}: {key}: there are several columns {column!r}")
-        places = [names.index(str(column))]
+        places = [names.index(said)]
     else:
         # A unit in brackets belongs to the column, and may be in one of the names only.
-        plain = without_unit(str(column))
+        plain = without_unit(said)
         places = [i for i, name in enumerate(names) if without_unit(name) == plain]
-        if not (by_text and len(places) == 1):
-            if not re.fullmatch(r"[0-9]{1,9}", str(column)) or int(column) >= len(names):
+        if not (raw.named and len(places) == 1):
+            if not re.fullmatch(r"[0-9]{1,9}", said) or int(said) >= len(names):
                 raise InputError(
                     f"{raw.path}: {key}: no column {column!r}; there are {short_list(names)}, "
                     "counted from 0"
                 )
-            places = [int(column)]
+            places = [int(said)]
     return places[0] if len(places) == 1 else None
 
 

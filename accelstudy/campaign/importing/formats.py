@@ -88,16 +88,17 @@ def _read_matlab(path: Path, variable: str | None) -> RawTable:
 def table_in_memory(frame: pd.DataFrame) -> RawTable:
     """Raw table of a DataFrame; an index of dates or durations becomes its last column."""
     frame = frame.copy()  # what its owner changes later is not of this log
-    columns, index, name = frame, frame.index, str(frame.index.name or "time")
+    columns, index, name = frame.rename(columns=str), frame.index, str(frame.index.name or "time")
     layout = {}
-    if isinstance(index, pd.DatetimeIndex | pd.TimedeltaIndex) and name not in map(str, frame):
-        times = index.total_seconds() if isinstance(index, pd.TimedeltaIndex) else index
-        columns, layout = columns.assign(**{name: times}), {"time": name}
+    if isinstance(index, pd.DatetimeIndex | pd.TimedeltaIndex) and name not in columns:
+        columns, layout = columns.assign(**{name: index}), {"time": name}
+    durations = columns.select_dtypes("timedelta")
+    columns = columns.assign(**{str(key): one.dt.total_seconds() for key, one in durations.items()})
     # A word between numbers, as files may have, too.
     mixed = [name for name, kind in columns.dtypes.items() if pd.api.types.is_object_dtype(kind)]
     columns = columns.astype(dict.fromkeys(mixed, str))
     try:
-        content = pa.Table.from_pandas(columns.rename(columns=str), preserve_index=False)
+        content = pa.Table.from_pandas(columns, preserve_index=False)
     except (TypeError, ValueError, NotImplementedError) as error:
         why = one_line(error.args[-1])
         raise InputError(f"log: the DataFrame cannot be a log, which has numbers: {why}") from None

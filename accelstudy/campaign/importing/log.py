@@ -15,7 +15,7 @@ import pyarrow as pa
 from numpy.typing import NDArray
 
 from accelstudy.basics.arguments import path_of
-from accelstudy.basics.arrays import Array
+from accelstudy.basics.arrays import Array, CachedTable
 from accelstudy.basics.errors import InputError
 from accelstudy.basics.units import CLOCK_UNITS, UNITS
 from accelstudy.basics.wording import plural
@@ -80,8 +80,8 @@ class Log:
     settings: Mapping[str, Any]
     layout: LogLayout
     places: Mapping[str, int]
-    samples: pd.DataFrame
-    start: float
+    samples: CachedTable = CachedTable()  # noqa: RUF009
+    start: float = np.nan
     wrap: int | None = None
     parts: tuple[Log, ...] = ()
 

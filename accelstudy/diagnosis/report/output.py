@@ -15,6 +15,7 @@ from matplotlib.axes import Axes
 from numpy.linalg import LinAlgError
 
 from accelstudy.basics import plugins, suggestions
+from accelstudy.basics.arrays import CachedTable
 from accelstudy.basics.errors import InputError
 from accelstudy.basics.names import MAX_NAME_BYTES
 from accelstudy.basics.progress import say, show, stage, warn
@@ -197,7 +198,7 @@ class Diagnosis(Result):
             "reason": confirmation.reason,
         }
 
-    @cached_property
+    @CachedTable
     def positions(self) -> pd.DataFrame:
         """One row per position, in SI unless the name of a column says otherwise.
 
