@@ -60,7 +60,7 @@ def _tell_table(table: pd.DataFrame) -> None:
             justify="left",
             formatters=forms,
             float_format=number,
-            na_rep="-",
+            na_rep="–",
         )
         click.echo("\n".join(map(str.rstrip, text.splitlines())))
     if legend := table.attrs.get("legend"):

@@ -234,9 +234,8 @@ class DataSheet(Result):
         ----------
         kelvin : float, K, difference from the temperature of the calibration
         """
-        return (self.bias_per_kelvin or 0.0) * abs(kelvin), (self.scale_per_kelvin or 0.0) * abs(
-            kelvin
-        )
+        bias, scale = self.bias_per_kelvin or 0.0, self.scale_per_kelvin or 0.0
+        return bias * abs(kelvin), scale * abs(kelvin)
 
     @property
     def quadratic_scale(self) -> float | None:

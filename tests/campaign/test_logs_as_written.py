@@ -220,8 +220,8 @@ def test_rows_of_several_sensors_are_refused(name):
     for settings in ({}, {"rate": 2 * HAND_RATE}, {"means": True}):
         with refused(f"column {name} has A7, B2; give the rows of each"):
             acs.find_holds(log, **settings)
-    one = acs.find_holds(log[log[name] == "B2"])
-    assert one.n_positions == HOLDS
+    for one in (log[log[name] == "B2"], table().assign(**{name: range(N)})):
+        assert acs.find_holds(one).n_positions == HOLDS
 
 
 def test_a_rate_that_the_times_contradict_is_told():
