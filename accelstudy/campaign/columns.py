@@ -99,15 +99,10 @@ def split(attribute: str, values: Any, n: int) -> dict[str, NDArray[Any]]:
     Raises
     ------
     InputError
-        If the array has another shape than (n,), or (n, k) for k columns, a value that is no
-        number, or times that decrease.
+        If the array has another shape than (n,), or (n, k) for k columns.
     """
     names = COLUMNS[attribute].names
     shape = (n, len(names)) if len(names) > 1 else (n,)
     if np.shape(values) != shape:
         raise InputError(f"{attribute}: shape {np.shape(values)}, not {shape}")
-    if (array := np.asarray(values)).dtype.kind not in "iuf" or not np.isfinite(array).all():
-        raise InputError(f"{attribute}: expected finite numbers")
-    if attribute == "time" and (np.diff(array) < 0).any():
-        raise InputError("time: decreases; holds must be in order of acquisition")
     return dict(zip(names, np.reshape(values, (n, len(names))).T, strict=True))

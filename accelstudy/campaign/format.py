@@ -36,8 +36,8 @@ def read_campaign(folder: str | Path, *, plausible: bool = True, running: bool =
 
     With ``unit: counts`` forces are (raw − offset) · scale, and sds are sd · abs(scale).
 
-    Numbers in `position` increase, but some may be missing, as after the removal of a hold. A
-    missing yaw of the robot is 0. Unknown columns are left out and named in `warnings`.
+    Numbers in `position` increase, but some may be missing, as after the removal of a hold.
+    Unknown columns are left out and named in `warnings`.
 
     Parameters
     ----------
@@ -70,7 +70,7 @@ def read_campaign(folder: str | Path, *, plausible: bool = True, running: bool =
         angles = None if header.sigma_angle is None else np.zeros((0, 2))
         campaign = Campaign(header, table_of({"forces": np.zeros((0, 3)), "angles": angles}))
     else:
-        campaign = _parse(columns, header, path, plausible)
+        campaign = parse(columns, header, path, plausible)
         if unknown := [name for name in columns if name not in KEYS]:
             hints = dict.fromkeys(did_you_mean(name, KEYS) for name in unknown)
             said = f"{path}: not known and ignored: {short_list(unknown)}{''.join(hints)}"
@@ -132,13 +132,13 @@ def write_campaign(campaign: Campaign, folder: str | Path, plausible: bool = Tru
     header, path = campaign.header, folder / TABLE
     if campaign.reasons:
         header = campaign.with_header(excluded=campaign.exclusions).header
-    columns = _columns_in_file(campaign)
-    _parse(columns, header, path, plausible)
+    columns = columns_in_file(campaign)
+    parse(columns, header, path, plausible)
     write_text(path, pd.DataFrame(columns).to_csv(index=False, lineterminator="\n"))
     write_yaml(folder / HEADER, header.model_dump(mode="json", exclude_none=True, by_alias=True))
 
 
-def _parse(columns: Table, header: Header, path: Path, plausible: bool = True) -> Campaign:
+def parse(columns: Table, header: Header, path: Path, plausible: bool = True) -> Campaign:
     """Check the columns of the table `path`, and make a campaign of them and the header."""
     if not any(map(len, columns.values())):
         raise InputError(f"{path}: no positions; expected one row per hold")
@@ -154,8 +154,6 @@ def _parse(columns: Table, header: Header, path: Path, plausible: bool = True) -
         array = header.conversion(attribute).to_si(array)
         arrays[attribute] = array.astype(np.int64) if column.whole else array
     _check_together(arrays, header, path)
-    if header.robot is not None:
-        arrays.setdefault("yaw", np.zeros(len(rows)))
     reasons = {entry.position: entry.reason for entry in header.excluded or ()}
     # The table of holds says it from here on.
     campaign = Campaign(header.model_copy(update={"excluded": None}), table_of(arrays))
@@ -225,7 +223,7 @@ def _check_together(arrays: Mapping[str, Array], header: Header, path: Path) -> 
         )
 
 
-def _columns_in_file(campaign: Campaign) -> dict[str, list[Any]]:
+def columns_in_file(campaign: Campaign) -> dict[str, list[Any]]:
     """Columns of all holds of a campaign, in the units of the file."""
     holds = campaign.holds.reset_index()
     table: dict[str, list[Any]] = {}

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from functools import cached_property
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -75,13 +76,14 @@ class Campaign:
     temperature, vibration = _of_holds("temperature"), _of_holds("vibration")
 
     @classmethod
-    def of(cls, content: Mapping[str, Any], **arrays: Any) -> Campaign:
-        """Make a campaign of arrays.
+    def of(cls, content: Mapping[str, Any], *, check: bool = True, **arrays: Any) -> Campaign:
+        """Make a campaign of arrays, which are checked as those of a folder are.
 
         Parameters
         ----------
         content : mapping, keys and values of `campaign.yaml`; at least `name` and `gravity`, as
             ``{"name": "mine", "gravity": {"value_mps2": 9.81}}``
+        check : bool, whether the arrays are checked; the import of a log says more on them
         arrays : in SI, by the names of the attributes: `forces`, and perhaps others
 
         Raises
@@ -89,8 +91,14 @@ class Campaign:
         InputError
             If a value cannot be right, or an array has another length.
         """
+        from accelstudy.campaign.format import columns_in_file, parse  # they know this class
+
         content = {"schema_version": 1, "unit": "m/s^2", **content}
-        return cls(validate(Header, content, content.get("name", "campaign")), table_of(arrays))
+        header = validate(Header, content, content.get("name", "campaign"))
+        campaign = cls(header, table_of(arrays))
+        if not check:
+            return campaign
+        return parse(columns_in_file(campaign), header, Path("campaign"), plausible=False)
 
     def __repr__(self) -> str:
         return f"Campaign({self.name!r}, {plural(self.n_positions, 'position')})"
@@ -150,6 +158,8 @@ class Campaign:
         """Conditions of the holds, such as time and temperature, as the effects take them."""
         known = [name for name in HoldConditions.columns() if name in self.holds]
         conditions: dict[str, Any] = {name: self.holds[name].to_numpy() for name in known}
+        if self.header.robot is not None:  # without its yaw, that is 0
+            conditions.setdefault("yaw", np.zeros(len(self.holds)))
         session = HoldConditions(**conditions, full_range=self.header.range_mps2)
         # The position before a hold acts on it, whether that position is used or not.
         forces = self.holds[[*COLUMNS["forces"].names]].to_numpy()

@@ -155,9 +155,9 @@ def test_units_of_the_file(tmp_path):
 
 def test_yaw_of_a_robot_that_gives_none_is_zero(tmp_path):
     write_campaign(campaign(yaw=None), tmp_path)
-    np.testing.assert_array_equal(read_campaign(tmp_path).yaw, np.zeros(len(ROLL)))
+    np.testing.assert_array_equal(read_campaign(tmp_path).hold.yaw, np.zeros(len(ROLL)))
     write_campaign(campaign({"robot": None}, angles=None, yaw=None), tmp_path)
-    assert read_campaign(tmp_path).yaw is None
+    assert read_campaign(tmp_path).hold.yaw is None
 
 
 def test_tolerated_ways_of_writing_csv(tmp_path):

@@ -282,12 +282,27 @@ def test_what_cannot_be_given_is_one_line(verb, given, message):
 @pytest.mark.parametrize(("arrays", "message"), [
     ({"force": np.eye(3)}, "unknown array of a campaign 'force'; did you mean 'forces'"),
     ({"time": [1, 2, 3]}, "forces: missing"),
-    ({"forces": np.diag([1, 1, np.nan])}, "forces: expected finite numbers"),
-    ({"forces": np.eye(3), "time": [2, 1, 3]}, "time: decreases"),
+    ({"forces": np.diag([1, 1, np.nan])}, "campaign: fz: position 3: nan is no number"),
+    ({"forces": np.eye(3), "time": [2, 1, 3]}, "campaign: time_s: position 2: 1.0 is before"),
+    ({"forces": np.eye(3), "angles": np.zeros((3, 2))}, r"campaign.yaml: robot.angle_sigma_mgon"),
 ])  # fmt: skip
 def test_a_campaign_of_arrays_is_checked(arrays, message):
     with pytest.raises(acs.InputError, match=f"^{message}"):
         acs.Campaign.of({"name": "mine", "gravity": {"value_mps2": 9.81}}, **arrays)
+
+
+def test_a_campaign_in_memory_is_as_its_folder(tmp_path):
+    header = {"name": "mine", "gravity": {"value_mps2": 9.80665}, "robot": {"angle_sigma_mgon": 3}}
+    header["excluded"] = [{"position": 2, "reason": "moved"}]
+    simulated = acs.simulate_campaign()
+    campaign = acs.Campaign.of(header, forces=simulated.forces, angles=simulated.angles)
+    assert campaign.reasons == {2: "moved"}
+    acs.write_campaign(campaign, tmp_path / "mine")
+    one, other = (
+        acs.calibrate(each, model="bias-scale-nonorthogonality+base_tilt").parameters
+        for each in (campaign, tmp_path / "mine")
+    )
+    assert one.equals(other)
 
 
 def test_a_section_says_which_keys_it_has():

@@ -130,8 +130,8 @@ class Calibration(Result):
         """
         from scipy import stats
 
-        share = quantity("level", plain(level), LEVEL)
-        half = stats.t.ppf((1 + share) / 2, self.sensor.dof) * self.parameters["sigma"]
+        level = quantity("level", plain(level), LEVEL)
+        half = stats.t.ppf((1 + level) / 2, self.sensor.dof) * self.parameters["sigma"]
         value, unit = self.parameters["value"], self.parameters["unit"]
         return pd.DataFrame({"low": value - half, "high": value + half, "unit": unit})
 

@@ -184,7 +184,7 @@ def _campaign_of_means(log: Log, settings: ImportSettings) -> Campaign:
         )
     shown = "unknown" if sigma is None else sigma_text(sigma)
     notes = (_columns_note(log, settings), f"{len(rows)} positions; sigma of a mean: {shown}")
-    campaign = Campaign.of(header, forces=log.forces, **columns)
+    campaign = Campaign.of(header, check=False, forces=log.forces, **columns)
     return _checked(replace(campaign, notes=notes, warnings=tuple(warnings)), log, settings)
 
 
@@ -237,6 +237,7 @@ def _campaign_of_holds(
     }
     campaign = Campaign.of(
         header,
+        check=False,
         positions=table.index.to_numpy(),
         forces=holds.means - offset,
         n_samples=table["n"].to_numpy(),
