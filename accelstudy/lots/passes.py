@@ -171,20 +171,21 @@ class Pass:
         return LotResiduals([one.frame for one in self.evidence], levels)
 
     @cached_property
-    def shown(self) -> dict[str, ShownEffect]:
+    def shown(self) -> dict[str, list[ShownEffect]]:
         """What sensors tell of the sizes of lasting effects that most of them show.
 
-        An effect has the shape that explains most if it is equally large in all, of those that its
-        first campaign tries and of the best one of the campaign that shows it most.
+        An effect has the shapes that its first campaign tries, and the best one of the campaign
+        that shows it most.
         """
-        shown = dict[str, ShownEffect]()
+        shown = dict[str, list[ShownEffect]]()
         for name in sorted({name for one in self.evidence for name in one.shapes}):
             showing = [one for one in self.evidence if name in one.shapes]
             if 2 * len(showing) > sum(one.base is not None for one in self.evidence):
                 most = max(showing, key=lambda one: one.odds[name])
-                shapes = {*showing[0].shapes[name], most.specs[name]}
-                if (best := self.residuals.strongest(sorted(shapes))) is not None:
-                    shown[name] = best
+                specs = sorted({*showing[0].shapes[name], most.specs[name]})
+                shapes = [one for one in map(self.residuals.shown, specs) if one.right.size]
+                if shapes:
+                    shown[name] = shapes
         return shown
 
     @cached_property
@@ -231,7 +232,8 @@ class Pass:
     @cached_property
     def _in_common(self) -> list[float]:
         """P-values of what the sensors have in common: sizes of effects, and any pattern."""
-        sizes = [_smallest([one.p_value for one in self.shown.values()])] if self.shown else []
+        each = [_smallest([one.p_value for one in shapes]) for shapes in self.shown.values()]
+        sizes = [_smallest(each)] if each else []
         return [*sizes, *self.residuals.p_value_of_pattern]
 
     @property
@@ -276,8 +278,8 @@ class Pass:
         other_size, each = self.mixture.own_size(first), [one.specs for one in self.evidence]
         having = self.mixture.effects[first].having + other_size
         most = max(self.evidence, key=lambda one: one.odds.get(first, -np.inf))
-        shown = self.shown.get(first)
-        spec = most.specs.get(first) if shown is None else shown.spec
+        typical = self.mixture.typical.get(first)
+        spec = typical[0].spec if typical else most.specs.get(first)
         own: tuple[str, ...] = ()
         if spec is not None:
             sudden = get_effect(spec).sudden

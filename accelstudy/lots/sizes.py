@@ -62,7 +62,6 @@ class ShownEffect(NamedTuple):
     right : (n, k) array, b
     pooled : (k,) array, its size if it is equally large in all
     part : float, how much they show of that, a χ² of k in noise alone
-    shapes : int, of the effect, of which this one shows most
     """
 
     spec: str
@@ -70,12 +69,11 @@ class ShownEffect(NamedTuple):
     right: Array
     pooled: Array
     part: float
-    shapes: int = 1
 
     @property
     def p_value(self) -> float:
         """Probability that noise alone would show as much in common."""
-        return min(self.shapes * float(stats.chi2.sf(self.part, len(self.pooled))), 1.0)
+        return float(stats.chi2.sf(self.part, len(self.pooled)))
 
 
 class TypicalSize(NamedTuple):
@@ -83,6 +81,7 @@ class TypicalSize(NamedTuple):
 
     Attributes
     ----------
+    spec : str, the effect in its shape
     odds : (n,) array, log odds of the sensors for the effect
     log_likelihood : float, of sizes and share
     cost : float, log of evidence over likelihood: what fitting the sizes costs
@@ -90,6 +89,7 @@ class TypicalSize(NamedTuple):
     share : float, ρ
     """
 
+    spec: str
     odds: Array
     log_likelihood: float
     cost: float
@@ -163,17 +163,6 @@ class LotResiduals:
         size = _solved(np.einsum("n,nkl->kl", weights, normal), weights @ right)
         return ShownEffect(spec, normal, right, size, float(weights @ right @ size))
 
-    def strongest(self, specs: Sequence[str]) -> ShownEffect | None:
-        """The shape of an effect that explains most if it is equally large in all, if any does.
-
-        Parameters
-        ----------
-        specs : the effect in its shapes
-        """
-        shown = [one for one in map(self.shown, specs) if one.right.size]
-        best = max(shown, key=lambda one: one.part, default=None)
-        return None if best is None else best._replace(shapes=len(shown))
-
     @cached_property
     def p_value_of_pattern(self) -> list[float]:
         """Probability that noise alone has as much in common, residual by residual; [] if none has.
@@ -190,19 +179,24 @@ class LotResiduals:
         shown = float(mean @ mean) / r
         return [float(stats.f.sf(shown * (n - 1) / max(n - shown, 1e-300), r, (n - 1) * r))]
 
-    def typical(self, effect: ShownEffect, odd: Array) -> list[TypicalSize]:
-        """Most probable sizes and share of an effect, for each scatter.
+    def typical(self, shapes: Sequence[ShownEffect], odd: Array) -> list[TypicalSize]:
+        """Most probable sizes and share of an effect in its likeliest shape, for each scatter.
 
         Parameters
         ----------
-        effect : what sensors tell of it
+        shapes : what sensors tell of the effect in each of its shapes
         odd : (n,) array, log odds of each sensor to be odd, whose sizes are not those of the type
         """
-        starts, none = [(x, effect.pooled / x) for x in SHARES], np.full_like(odd, -np.inf)
-        # If sizes differ much, each sensor looks odd beside their mean.
-        starting = [self._search(effect, none, max(SCATTERS), *start) for start in starts]
-        starts += [(one.share, one.mean) for one in starting]
-        likelihood = attrgetter("log_likelihood")
+        none, likelihood = np.full_like(odd, -np.inf), attrgetter("log_likelihood")
+        most = [
+            # If sizes differ much, each sensor looks odd beside their mean.
+            [self._search(effect, none, max(SCATTERS), x, effect.pooled / x) for x in SHARES]
+            for effect in shapes
+        ]
+        best = max(range(len(shapes)), key=lambda i: max(map(likelihood, most[i])))
+        effect = shapes[best]
+        starts = [(x, effect.pooled / x) for x in SHARES]
+        starts += [(one.share, one.mean) for one in most[best]]
         return [
             max((self._search(effect, odd, τ, *start) for start in starts), key=likelihood)
             for τ in SCATTERS
@@ -215,7 +209,8 @@ class LotResiduals:
 
         Parameters
         ----------
-        effect, odd : as in `typical`
+        effect : what sensors tell of it in one of its shapes
+        odd : as in `typical`
         scatter : float, τ
         share, mean : ρ and μ to begin with
         """
@@ -242,7 +237,8 @@ class LotResiduals:
             score = right - np.einsum("nkl,nlm,nm->nk", normal, spread, right)
             mean = _solved(pooled, weights @ score)
             share = float(np.clip(has[1].sum() / max(has[:2].sum(), 1e-300), 0.01, 0.999))
-        return TypicalSize(odds, before, _cost_of_fitting(k, mean @ pooled @ mean), mean, share)
+        cost = _cost_of_fitting(k, mean @ pooled @ mean)
+        return TypicalSize(effect.spec, odds, before, cost, mean, share)
 
 
 def _solved(normal: Array, right: Array) -> Array:

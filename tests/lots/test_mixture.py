@@ -115,7 +115,7 @@ def test_the_evidence_of_an_effect_is_its_integral():
     value = np.exp(mixture.effects[one].log_weight)
     assert value == pytest.approx(PRIOR_MISSING * 0.7 * alone, rel=1e-4)
     # A type may have sizes, with one scatter or another.
-    typical = [TypicalSize(odds[:, 1] + i, 0.0, -0.3, np.ones(1), 0.9) for i in (0, 1)]
+    typical = [TypicalSize(one, odds[:, 1] + i, 0.0, -0.3, np.ones(1), 0.9) for i in (0, 1)]
     alike = np.exp(-0.3) * np.mean([over_shares(size.odds) for size in typical])
     value = np.exp(Mixture(prior, own, {one: typical}).effects[one].log_weight)
     expected = (1 - PRIOR_ALIKE) * alone + PRIOR_ALIKE * alike
@@ -152,7 +152,7 @@ def test_odds_are_the_integral_over_sizes_and_noise(freedom):
     points = np.linspace(-9, 9, 301)
     shape = freedom / 2
     variance = stats.invgamma.ppf((np.arange(2000) + 0.5) / 2000, shape, scale=shape)
-    typical = residuals.typical(told, NEVER)
+    typical = residuals.typical([told], NEVER)
     assert typical[1].share == pytest.approx(2 / 3, abs=0.2)
     for scatter, of_type in zip(SCATTERS, typical, strict=True):
         for i in (0, 20):
@@ -172,7 +172,7 @@ def test_a_size_that_is_fitted_costs_what_its_integral_says():
     """One size in all sensors: the evidence is the mean of the likelihood over the prior of it."""
     *_, residuals = type_of(np.random.default_rng(6), np.full((N, 3), [1.0, 0.0, 0.0]))
     told = residuals.shown(NAMES[0])
-    of_type = residuals.typical(told, NEVER)[SCATTERS.index(0.0)]
+    of_type = residuals.typical([told], NEVER)[SCATTERS.index(0.0)]
     normal, right = told.normal.sum(), told.right.sum()
     best, sigma = right / normal, 1 / np.sqrt(normal)
     size = best + sigma * np.linspace(-9, 9, 2001)
@@ -182,6 +182,16 @@ def test_a_size_that_is_fitted_costs_what_its_integral_says():
     assert of_type.odds.sum() + of_type.cost == pytest.approx(integral, abs=0.1)
 
 
+@pytest.mark.parametrize("seed", range(5))
+def test_an_effect_of_some_sensors_has_the_shape_in_which_these_have_it(seed):
+    """What is plain in a quarter of them is not outweighed by chance in the others."""
+    rng, sizes = np.random.default_rng(seed), np.zeros((N, 3))
+    sizes[::4, 1] = 30.0
+    *_, residuals = type_of(rng, sizes)
+    shapes = [residuals.shown(name) for name in NAMES]
+    assert {one.spec for one in residuals.typical(shapes, NEVER)} == {NAMES[1]}
+
+
 def test_a_size_of_its_own_makes_a_sensor_odd_and_has_no_say_in_those_of_the_type():
     sizes = np.full((N, 3), [1.0, 0.0, 0.0])
     sizes[5] *= 40
@@ -189,7 +199,7 @@ def test_a_size_of_its_own_makes_a_sensor_odd_and_has_no_say_in_those_of_the_typ
     told = residuals.shown(NAMES[0])
     odd = told.right[:, 0] ** 2 / told.normal[:, 0, 0] / 2 - 10  # by a size of its own
     scale = told.normal[0, 0, 0] / (residuals.frames[0].rows(get_effect(NAMES[0])) ** 2).sum()
-    typical = residuals.typical(told, odd)
+    typical = residuals.typical([told], odd)
     for of_type in typical[:2]:
         assert abs(of_type.mean[0]) * np.sqrt(scale) == pytest.approx(1.0, abs=0.2)
     apart = mixture_of(odd[:, None] + 5, {NAMES[0]: typical}).own_size(NAMES[0])
