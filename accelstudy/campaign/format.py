@@ -3,28 +3,22 @@
 from __future__ import annotations
 
 import io
-from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pandas as pd
-from numpy.typing import NDArray
 
-from accelstudy.basics.arrays import Array
 from accelstudy.basics.errors import InputError, brief, did_you_mean, locate_errors
 from accelstudy.basics.wording import one_line, short_list
-from accelstudy.campaign.columns import COLUMNS, KEYS, Columns, table_of
+from accelstudy.campaign.columns import KEYS, table_of
 from accelstudy.campaign.gross_errors.recognition import check_plausible
 from accelstudy.campaign.header import HEADER, TABLE, Header
 from accelstudy.campaign.session import Campaign
+from accelstudy.campaign.table import Table, columns_in_file, holds_in_file
 from accelstudy.files.outputs import write_text, write_yaml
 from accelstudy.files.reading import read_layer, read_text
 from accelstudy.files.validation import validate
-
-Table = Mapping[str, Sequence[Any]]
-"""The table of positions by name: texts of its file, or numbers that are to be written."""
 
 
 def read_campaign(folder: str | Path, *, plausible: bool = True, running: bool = False) -> Campaign:
@@ -70,7 +64,7 @@ def read_campaign(folder: str | Path, *, plausible: bool = True, running: bool =
         angles = None if header.sigma_angle is None else np.zeros((0, 2))
         campaign = Campaign(header, table_of({"forces": np.zeros((0, 3)), "angles": angles}))
     else:
-        campaign = parse(columns, header, path, plausible)
+        campaign = _campaign_of(columns, header, path, plausible)
         if unknown := [name for name in columns if name not in KEYS]:
             hints = dict.fromkeys(did_you_mean(name, KEYS) for name in unknown)
             said = f"{path}: not known and ignored: {short_list(unknown)}{''.join(hints)}"
@@ -132,105 +126,16 @@ def write_campaign(campaign: Campaign, folder: str | Path, plausible: bool = Tru
     header, path = campaign.header, folder / TABLE
     if campaign.reasons:
         header = campaign.with_header(excluded=campaign.exclusions).header
-    columns = columns_in_file(campaign)
-    parse(columns, header, path, plausible)
+    columns = columns_in_file(campaign.holds, header)
+    _campaign_of(columns, header, path, plausible)
     write_text(path, pd.DataFrame(columns).to_csv(index=False, lineterminator="\n"))
     write_yaml(folder / HEADER, header.model_dump(mode="json", exclude_none=True, by_alias=True))
 
 
-def parse(columns: Table, header: Header, path: Path, plausible: bool = True) -> Campaign:
+def _campaign_of(columns: Table, header: Header, path: Path, plausible: bool) -> Campaign:
     """Check the columns of the table `path`, and make a campaign of them and the header."""
-    if not any(map(len, columns.values())):
-        raise InputError(f"{path}: no positions; expected one row per hold")
-    rows = [f"row {i}" for i in range(1, 1 + max(map(len, columns.values())))]
-    arrays: dict[str, Any] = {}
-    for attribute, column in COLUMNS.items():
-        if not (column.needed or {*column.keys} & {*columns}):
-            continue
-        parts = [_numbers(columns, key, column, rows, path) for key in column.keys]
-        if attribute == "positions":
-            rows = [f"position {value:.0f}" for value in parts[0]]
-        array = np.column_stack(parts) if parts[1:] else parts[0]
-        array = header.conversion(attribute).to_si(array)
-        arrays[attribute] = array.astype(np.int64) if column.whole else array
-    _check_together(arrays, header, path)
-    reasons = {entry.position: entry.reason for entry in header.excluded or ()}
-    # The table of holds says it from here on.
-    campaign = Campaign(header.model_copy(update={"excluded": None}), table_of(arrays))
+    campaign = Campaign(header, holds_in_file(columns, header, path))
     if plausible:
         check_plausible(campaign, f"{path.with_name(HEADER)} and {path.name}")
     with locate_errors(path.with_name(HEADER)):
-        return campaign.without(reasons)
-
-
-def _numbers(columns: Table, name: str, column: Columns, rows: Sequence[str], path: Path) -> Array:
-    """Numbers of a column, checked; errors name the row."""
-    if name not in columns:
-        rest = ", ".join(other for other in column.keys if other != name)
-        group = f" (it goes with {rest})" if rest else ""
-        others = [other for other in columns if other not in KEYS]
-        raise InputError(
-            f"{path}: {name}: the column is missing{group}{did_you_mean(name, others)}"
-        )
-    values = np.array([*map(_number, columns[name])])
-
-    def refuse(wrong: NDArray[np.bool_], text: str) -> None:
-        if wrong.any():
-            i = int(np.argmax(wrong))
-            raise InputError(f"{path}: {name}: {rows[i]}: {brief(columns[name][i])} {text}")
-
-    refuse(~np.isfinite(values), "is no number, such as -9.81; leave out a hold without a mean")
-    for i in np.flatnonzero((values < column.within.least) | (values > column.within.most))[:1]:
-        column.within.check_key(f"{path}: {name}: {rows[i]}", values[i])
-    if column.whole:
-        refuse(values % 1 != 0, "is no whole number")
-    behind = np.diff(values, prepend=-np.inf)
-    if name == "position":
-        refuse(behind <= 0, "follows no smaller number; number the holds 1, 2, 3 … as acquired")
-    if name == "time_s":
-        refuse(behind < 0, "is before the hold above; rows must be in order of acquisition")
-    return values
-
-
-def _number(cell: Any) -> float:
-    """Number of a cell; NaN if it is none. Python would also take 1_0 for one."""
-    try:
-        return float(str(cell).replace("_", "?"))
-    except ValueError:
-        return np.nan
-
-
-def _check_together(arrays: Mapping[str, Array], header: Header, path: Path) -> None:
-    """Check that every channel works, and that angles and their sigma come together."""
-    for name, channel in zip(COLUMNS["forces"].keys, arrays["forces"].T, strict=True):
-        if len(channel) > 1 and np.ptp(channel) == 0:
-            raise InputError(
-                f"{path}: {name}: the same in all positions; a channel that works changes"
-            )
-    angles = " and ".join(COLUMNS["angles"].keys)
-    if "angles" not in arrays:
-        if "yaw" in arrays:
-            raise InputError(f"{path}: yaw_robot_gon: goes with {angles}, which are missing")
-        for key in ("robot", "reference"):
-            if getattr(header, key) is not None:
-                raise InputError(
-                    f"{path.with_name(HEADER)}: {key}: is given, but {path.name} has no {angles}"
-                )
-    elif header.robot is None and header.reference is None:
-        raise InputError(
-            f"{path.with_name(HEADER)}: robot.angle_sigma_mgon: missing, but {path.name} has "
-            f"{angles}"
-        )
-
-
-def columns_in_file(campaign: Campaign) -> dict[str, list[Any]]:
-    """Columns of all holds of a campaign, in the units of the file."""
-    holds = campaign.holds.reset_index()
-    table: dict[str, list[Any]] = {}
-    for attribute, columns in COLUMNS.items():
-        if columns.names[0] in holds:
-            values = holds[[*columns.names]].to_numpy()
-            if not columns.whole:
-                values = campaign.header.conversion(attribute).from_si(values)
-            table |= zip(columns.keys, values.T.tolist(), strict=True)
-    return table
+        return campaign.without_excluded()

@@ -18,6 +18,7 @@ from accelstudy.basics.wording import plural
 from accelstudy.campaign.columns import COLUMNS, split, table_of
 from accelstudy.campaign.header import Header
 from accelstudy.campaign.sensor_type import SensorType
+from accelstudy.campaign.table import columns_in_file, holds_in_file
 from accelstudy.effects import HoldConditions
 from accelstudy.files.validation import validate
 
@@ -91,14 +92,13 @@ class Campaign:
         InputError
             If a value cannot be right, or an array has another length.
         """
-        from accelstudy.campaign.format import columns_in_file, parse  # they know this class
-
         content = {"schema_version": 1, "unit": "m/s^2", **content}
         header = validate(Header, content, content.get("name", "campaign"))
         campaign = cls(header, table_of(arrays))
-        if not check:
-            return campaign
-        return parse(columns_in_file(campaign), header, Path("campaign"), plausible=False)
+        if check:
+            columns = columns_in_file(campaign.holds, header)
+            campaign = cls(header, holds_in_file(columns, header, Path("campaign")))
+        return campaign.without_excluded()
 
     def __repr__(self) -> str:
         return f"Campaign({self.name!r}, {plural(self.n_positions, 'position')})"
@@ -199,6 +199,12 @@ class Campaign:
         why = {**self.reasons, **reasons}
         left_out = [why.get(position, "") for position in self.holds.index.tolist()]
         return replace(self, holds=self.holds.assign(left_out=left_out))
+
+    def without_excluded(self) -> Campaign:
+        """Leave out the holds that the header excludes; the table of holds says it from here on."""
+        reasons = {entry.position: entry.reason for entry in self.header.excluded or ()}
+        header = self.header.model_copy(update={"excluded": None})
+        return replace(self, header=header).without(reasons)
 
     def with_arrays(self, **arrays: Any) -> Campaign:
         """Return the campaign with other values of the holds that are used.
