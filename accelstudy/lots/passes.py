@@ -321,14 +321,14 @@ class Pass:
         """Odd sensors, the surest first; 5 of 100 are expected to be wrong."""
         names = [name for name in self.mixture.own if name not in self._named]
         own = np.array([self.mixture.own[n] + np.log(self.mixture.prior[n]) for n in names])
-        own = special.softmax(own, axis=0)
         # Sensors of which nobody doubts it stay in their order.
         posterior = self.posterior_odd
         order = np.argsort(-np.round(posterior, 3), kind="stable")[: count_odd(posterior)]
         odd = list[OddSensor]()
         for i in order:
-            first = np.argsort(-own[:, i], kind="stable")
-            first = first[: _count_certain(own[first, i])]
+            shares = special.softmax(own[:, i])
+            first = np.argsort(-shares, kind="stable")
+            first = first[: _count_certain(shares[first])]
             members = tuple(member for k in first for member in self.classes[names[k]])
             odd.append(OddSensor(self.evidence[i].campaign, members, float(posterior[i])))
         return odd
