@@ -96,7 +96,8 @@ class Advice(Result):
     undetermined : tuple of str, parameters that the positions do not determine yet
     sigma_seen : float or None, m/s², noise of a position by the residuals; None without redundancy
     sigma_taken : float or None, m/s², by which the accuracy is judged; None as long as it is
-        unknown. It is the stated one, if there is one and the residuals do not refute it.
+        unknown. It is the stated one if that is known, an upper confidence bound if it is an
+        estimate, and that of the residuals if these refute it.
     redundancy : int
     rms : (2,) array, rad, of roll and of pitch; None as long as it is not known
     next : (3,) array, direction of gravity in the body frame in the position to take next

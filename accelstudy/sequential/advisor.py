@@ -41,7 +41,7 @@ from accelstudy.sequential.choice import (
     candidate_positions,
     typical_sizes,
 )
-from accelstudy.sequential.promise import LEAST_REDUNDANCY, Promise, bound, known_variance
+from accelstudy.sequential.promise import LEAST_REDUNDANCY, Promise, bound
 
 KNOWN_RATIO = 0.5
 """Ratio of sigma to the typical size of a parameter, up to which it counts as known at all."""
@@ -120,6 +120,7 @@ def advise(
     stated = campaign.sigma_force is not None
     trusted = stated if fit is None else fit.noise.trusted
     wrong = fit is not None and fit.state in (REJECTED, IMPLAUSIBLE)
+    sigma_dof = (campaign.header if fit is None else fit.solution).sigma_dof if trusted else 0.0
     noise = campaign_noise(campaign)
     if fit is not None:
         noise = replace(noise, sigma_force=fit.solution.sigma_force)
@@ -131,12 +132,16 @@ def advise(
         ),
         promise.tilt_error(model, at, campaign.gravity, campaign.hold if n else holds),
         promise,
-        known_variance if trusted else bound,
+        sigma_dof,
         typical_sizes(model, known.information.rows.shape[1]),
     )
     rms = chooser.rms(known)
-    if fit is not None and stated:
-        rms = fit.tilt_budget(promise.tilt_range).total
+    refuted = stated and not trusted
+    if fit is not None and (refuted or np.isfinite(rms).all()):
+        judged = fit.noise
+        if not refuted:
+            judged = judged._replace(variance=float(bound(*fit.solution.of_positions, sigma_dof)))
+        rms = replace(fit, judgement=judged).tilt_budget(promise.tilt_range).total
     enough = bool(promise.is_kept(rms)) and not wrong
 
     last = -campaign.forces[-1] / np.linalg.norm(campaign.forces[-1]) if n else None
@@ -144,9 +149,9 @@ def advise(
     to_go, varying = None, bool(CONDITIONS & {*model.hold_columns})
     foreseeable = (trusted or known.redundancy >= LEAST_REDUNDANCY) and not varying
     if foreseeable and not enough and not wrong:
-        variance = 1.0 if trusted else known.omega / known.redundancy
+        variance = 1.0 if fit is None else fit.noise.variance
         to_go = chooser.positions_to_go(known, variance, rms, last)
-    seen, taken = _sigmas(known, campaign.sigma_force, trusted, noise.sigma_force)
+    seen, taken = _sigmas(known, noise.sigma_force, sigma_dof, refuted)
     advice = Advice(
         session=campaign,
         model=model,
@@ -214,15 +219,13 @@ def _undetermined(
 
 
 def _sigmas(
-    known: Knowledge, stated: float | None, trusted: bool, unit: float
+    known: Knowledge, unit: float, sigma_dof: float, refuted: bool
 ) -> tuple[float | None, float | None]:
     """Noise of a position by the residuals, and that by which the accuracy is judged, m/s²."""
     omega, r = known.omega, known.redundancy
     seen = unit * float(np.sqrt(omega / r)) if known.determined and r > 0 else None
-    if stated is not None:
-        return seen, stated if trusted else seen
-    largest = unit * float(np.sqrt(bound(omega, r)))
-    return seen, largest if np.isfinite(largest) else None
+    largest = unit * float(np.sqrt(bound(omega, r, sigma_dof)))
+    return seen, seen if refuted else largest if np.isfinite(largest) else None
 
 
 def next_holds(campaign: Campaign, directions: Array) -> HoldConditions:

@@ -166,6 +166,24 @@ def test_it_never_says_enough_where_the_calibration_is_rejected():
     assert enough > 0.1
 
 
+def test_a_noise_that_few_holds_tell_is_taken_as_its_upper_bound():
+    model, by = get_model(MODEL), get_approach("gravity")
+    whole = session(model, np.zeros(9), get_scheme("faces-edges-corners-26").directions)
+    forces = whole.draw(Noise(0.002), 1, np.random.default_rng(1)).forces[0]
+
+    def advice(accuracy=12, **noise):
+        campaign = made(forces, header={"sensor_noise": {"sigma_mps2": 0.002, **noise}})
+        promise, directions = Promise(accuracy * MGON, 30 * GON), candidate_positions("cube")
+        return advice_for(campaign, model, by, promise, directions)
+
+    known, few, many = advice(), advice(degrees_of_freedom=8), advice(degrees_of_freedom=1e5)
+    assert (known.enough, few.enough, many.enough) == (True, False, True)
+    assert "known with 8 degrees of freedom" in few.summary()
+    assert few.sigma_taken > 1.2 * known.sigma_taken
+    np.testing.assert_allclose(few.rms / few.sigma_taken, known.rms / known.sigma_taken)
+    assert many.sigma_taken == pytest.approx(known.sigma_taken, rel=0.01)
+
+
 def test_a_repeat_that_disagrees_too_was_not_bumped(begun):
     folder = begun(30, bumped=[29])
     rows = (folder / "positions.csv").read_text(encoding="utf-8").splitlines()

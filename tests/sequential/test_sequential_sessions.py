@@ -10,7 +10,7 @@ from accelstudy.basics.units import GON, MGON
 from accelstudy.design.information import Information, position_rows
 from accelstudy.schemes import get_scheme
 from accelstudy.sequential.choice import Chooser, Knowledge, candidate_positions, typical_sizes
-from accelstudy.sequential.promise import LEAST_REDUNDANCY, LEVEL, Promise, bound, known_variance
+from accelstudy.sequential.promise import LEAST_REDUNDANCY, LEVEL, Promise, bound
 from accelstudy.simulation.sessions import Noise
 
 # --- the choice of a position --------------------------------------------------------------------
@@ -35,7 +35,7 @@ def chooser(approach, scheme, directions=None, accuracy=10 * MGON):
     promise = Promise(accuracy, 30 * GON)
     rows = position_rows(NINE, get_approach(approach), Noise(), chosen)
     error = promise.tilt_error(NINE)
-    return Chooser(chosen, rows, error, promise, known_variance, typical_sizes(NINE, 9))
+    return Chooser(chosen, rows, error, promise, np.inf, typical_sizes(NINE, 9))
 
 
 def known(rows, determined):
@@ -90,3 +90,8 @@ def test_bounds_of_the_variance():
     assert np.mean(bound(omega, 12) > 1) == pytest.approx(LEVEL, abs=4 * 0.0011)
     assert np.isinf(bound(omega[:2], LEAST_REDUNDANCY - 1)).all()
     assert np.isfinite(bound(omega[:2], LEAST_REDUNDANCY)).all()
+    assert np.array_equal(bound(omega[:2], 12, np.inf), [1, 1])
+    # The variance in units of a stated one that is an estimate.
+    variance = 3 / stats.chi2(3).rvs(20_000, random_state=2)
+    kept = [bound(v * o, 12, 3.0) > v for v, o in zip(variance, omega, strict=True)]
+    assert np.mean(kept) == pytest.approx(LEVEL, abs=4 * 0.0011)
