@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import os
 from collections.abc import Iterable, Iterator, Mapping
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from errno import ENOTDIR
 from pathlib import Path
@@ -289,6 +289,9 @@ def _publish(new: Path, out: Path, kind: OutputKind, is_earlier_result: bool) ->
     for file in sorted(files, key=lambda file: file == Path(kind.marker)):
         (out / file).parent.mkdir(parents=True, exist_ok=True)
         (new / file).replace(out / file)
+    for file in stale - files:
+        with suppress(OSError):  # other files are in it
+            (out / file).parent.rmdir()
 
 
 def _check_free(out: Path, files: Iterable[Path], folders: Iterable[Path]) -> None:

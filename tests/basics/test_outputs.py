@@ -53,12 +53,14 @@ def test_a_new_folder_has_usual_permissions(tmp_path):
 def test_an_earlier_result_is_replaced_whole(tmp_path):
     """Also what the new run does not write; the folder itself stays, it may be one's own place."""
     out = tmp_path / "out"
-    write(out, diagnosis_json="old", loop_parquet="old", figures__loop_png="old", notes_txt="mine")
+    write(out, diagnosis_json="old", loop_parquet="old", figures__loop_png="old", notes_txt="mine",
+          figures__one__gap_png="old")  # fmt: skip
     number = out.stat().st_ino
     with DIAGNOSIS.place(out) as folder:
         write(folder, diagnosis_json="new", figures__gap_png="new")
     expected = {"diagnosis.json": b"new", "figures/gap.png": b"new", "notes.txt": b"mine"}
     assert content(out) == expected
+    assert not (out / "figures/one").exists()
     assert out.stat().st_ino == number
 
 
