@@ -132,7 +132,10 @@ class ReferenceLog:
         records, lost = self._records(holds, float(np.nan_to_num(apart)) + self.offset)
         table = holds.table.drop(index=[*lost])
         means, used = np.array([records[n].mean(axis=0) for n in table.index]), table.left_out == ""
-        with _remedy("it is read in the unit of the log of which `reference` was made"):
+        with _remedy(
+            "it is read in the unit of the log of which `reference` was made, unless names such as "
+            "ax [m/s^2] of `reference_columns` tell another"
+        ):
             check_size(f"{self.log.path}", means, gravity, self.log.layout.conversion)
         own, forces = self.calibration.correct(means), table[["fx", "fy", "fz"]].to_numpy() - offset
         frame = self._frame(forces[used], own[used])
@@ -169,7 +172,8 @@ class ReferenceLog:
         """Samples (m, 3) of the reference, m/s², in holds, and why it has none in others."""
         log, table, where = self.log, holds.table, f"`reference_log` {self.log.path}"
         full_range = self.calibration.document.range_mps2 or np.inf
-        limit = MAX_WANDER * windows_at_rest(log).threshold
+        with _remedy("a name as time_ms tells the unit of its times"):
+            limit = MAX_WANDER * windows_at_rest(log).threshold
         time, forces = log.time + apart, log.forces @ self.calibration.mending.T
         records: dict[int, Array] = {}
         lost: dict[int, str] = {}

@@ -97,9 +97,15 @@ def test_from_two_logs_to_the_sensor(plate):
 
 
 def test_other_columns_and_times(plate):
-    """Columns by option; a clock that is off by an offset; no clock at all."""
-    first = imported(plate)
+    """Columns by option, with units in their names; a clock that is off by an offset."""
+    first, units = imported(plate), "time_ms,p [g],q [g],r [g]"
+    table = pd.read_csv(plate / "other.csv") * [1000, *[1 / 9.80665] * 3]
+    # The columns of the log of the calibration are there, too, with another sensor in them.
+    table.set_axis(units.split(","), axis=1).assign(time=1.0, ax=1.0, ay=1.0, az=1.0).to_csv(
+        plate / "units.csv", index=False
+    )
     for log, how in (
+        ("units.csv", {"reference_columns": "fx=p [g],fy=q [g],fz=r [g],time=time_ms"}),
         ("other.csv", {"reference_columns": "fx=p,fy=q,fz=r,time=t"}),
         ("shifted.csv", {"reference_offset": -18}),
     ):

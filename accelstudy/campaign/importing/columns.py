@@ -73,8 +73,8 @@ def resolve_layout(
     """Find out how a log is laid out.
 
     What is given counts before what the format of the file and the names of its columns say, and
-    this before how another log of the sensor was read. A log with the columns of that other one is
-    read as it was.
+    this before how another log of the sensor was read. Of a log with the columns of that other one
+    names say nothing more, unless other columns are given.
 
     Parameters
     ----------
@@ -102,7 +102,9 @@ def resolve_layout(
             raise InputError(f"{raw.path}: {each}; give the rows of each sensor by themselves")
     if {"time", "rate"} <= given.keys():
         raise InputError(f"{raw.path}: give the rate or the column of time, not both")
-    another = like is None or like.columns.get("fx") not in raw.names
+    usual = {} if like is None else {**like.columns, "time": like.time}
+    said = {**given.get("columns", {}), "time": given.get("time", usual.get("time"))}
+    another = usual.get("fx") not in raw.names or {**usual, **said} != usual
     inferred = {**layout_by_names(raw.names), **raw.layout} if another else {}
     if raw.frame is not None:
         inferred |= raw.layout  # the times of its index
@@ -139,9 +141,12 @@ def _overlaid(
     """Layout of another log overlaid with what a log tells and what is given of it.
 
     If all three columns of the forces are known, they replace all others, since then the log is
-    another one. A column of time replaces a rate, and a unit the scale of counts.
+    another one. A column of time replaces a rate and the unit of another one, and a unit the scale
+    of counts.
     """
     layout = {} if like is None else like.model_dump(exclude_none=True)
+    if {**layout, **inferred, **given}.get("time") != layout.get("time"):
+        layout.pop("time_unit", None)
     for layer in (inferred, given):
         replaced = {"time", "rate"} if layer.keys() & {"time", "rate"} else set()
         if layer.get("unit", "counts") != "counts":
