@@ -21,12 +21,14 @@ from accelstudy.campaign.importing.noise import hold_noise, sigma_text
 from accelstudy.campaign.importing.windows import windows_at_rest
 from accelstudy.campaign.reference import ReferenceSensor
 from accelstudy.leveling.angles import angles_of, near_pole
+from accelstudy.pages import render_lines
 from accelstudy.sensors.frames import Frame
 
 if TYPE_CHECKING:
     from accelstudy.campaign.calibration.sensor_calibration import SensorCalibration
 
 
+DOUBTS = "campaign/calibration/leveling.txt.j2"
 KEYWORDS = ("reference_log", "reference", "reference_columns", "reference_offset")
 """Keywords of an import by which a reference is given."""
 MIN_COVERAGE = 0.5
@@ -132,10 +134,7 @@ class ReferenceLog:
         records, lost = self._records(holds, float(np.nan_to_num(apart)) + self.offset)
         table = holds.table.drop(index=[*lost])
         means, used = np.array([records[n].mean(axis=0) for n in table.index]), table.left_out == ""
-        with _remedy(
-            "it is read in the unit of the log of which `reference` was made, unless names such as "
-            "ax [m/s^2] of `reference_columns` tell another"
-        ):
+        with _remedy("names as ax [m/s^2] tell another unit than that of the log of `reference`"):
             check_size(f"{self.log.path}", means, gravity, self.log.layout.conversion)
         own, forces = self.calibration.correct(means), table[["fx", "fy", "fz"]].to_numpy() - offset
         frame = self._frame(forces[used], own[used])
@@ -154,7 +153,9 @@ class ReferenceLog:
         why = "the x axis of the reference is too near to the vertical for a roll"
         lost |= dict.fromkeys(table.index[poles].tolist(), why)
         table["left_out"] = table["left_out"].where(~(poles & used), why)
-        warnings = [f"hold {n} left out: {reason}" for n, reason in lost.items()]
+        doubts = render_lines(DOUBTS, "doubts", self.calibration.document)
+        warnings = [f"`reference` {reference.calibration}: {doubt}" for doubt in doubts]
+        warnings += [f"hold {n} left out: {reason}" for n, reason in lost.items()]
         clock = "of the same clock" if np.isfinite(apart) else "begun together with the log"
         clock += f", {self.offset:+g} s" if self.offset else ""
         return (

@@ -136,6 +136,17 @@ def test_logs_that_tell_no_angles(plate, log):
         imported(plate, log)
 
 
+def test_a_rejected_reference_is_told(plate):
+    log = pd.read_csv(plate / "alone.csv")
+    log.loc[log["time"] > 40, "ax"] += 0.1
+    calibration = acs.calibrate(acs.find_holds(log))
+    calibration.save(plate / "rejected")
+    (doubt,) = imported(plate, calibration="rejected").warnings[:1]
+    assert calibration.state == "rejected"
+    assert "reference" in doubt and "the calibration is rejected: its residuals are" in doubt
+    assert "rejected" not in " ".join(imported(plate).warnings)
+
+
 def test_angles_in_the_log_are_not_used(plate):
     log = pd.read_csv(plate / "log.csv").assign(roll=0.0, pitch=0.0)
     assert "; not used: roll, pitch" in " ".join(imported(plate, log=log).notes)
