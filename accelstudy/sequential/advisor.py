@@ -138,9 +138,8 @@ def advise(
     rms = chooser.rms(known)
     refuted = stated and not trusted
     if fit is not None and (refuted or np.isfinite(rms).all()):
-        judged = fit.noise
-        if not refuted:
-            judged = judged._replace(variance=float(bound(*fit.solution.of_positions, sigma_dof)))
+        upper = bound(*fit.solution.of_positions, sigma_dof)
+        judged = fit.noise if refuted else fit.noise._replace(variance=float(upper))
         rms = replace(fit, judgement=judged).tilt_budget(promise.tilt_range).total
     enough = bool(promise.is_kept(rms)) and not wrong
 
@@ -151,7 +150,9 @@ def advise(
     if foreseeable and not enough and not wrong:
         variance = 1.0 if fit is None else fit.noise.variance
         to_go = chooser.positions_to_go(known, variance, rms, last)
-    seen, taken = _sigmas(known, noise.sigma_force, sigma_dof, refuted)
+    omega, r, unit = known.omega, known.redundancy, noise.sigma_force
+    seen = unit * float(np.sqrt(omega / r)) if known.determined and r > 0 else None
+    largest = unit * float(np.sqrt(bound(omega, r, sigma_dof)))
     advice = Advice(
         session=campaign,
         model=model,
@@ -162,8 +163,8 @@ def advise(
         calibration_state="" if fit is None else fit.state,
         undetermined=() if known.determined else _undetermined(campaign, model, approach, known),
         sigma_seen=seen,
-        sigma_taken=taken,
-        redundancy=known.redundancy,
+        sigma_taken=seen if refuted else largest if np.isfinite(largest) else None,
+        redundancy=r,
         rms=rms if np.isfinite(rms).all() else None,
         next=directions[chooser.choose(known, rms, last)],
         to_go=to_go,
@@ -216,16 +217,6 @@ def _undetermined(
         return tuple(hardly.tolist())
     theory = campaign_estimability(campaign, model, approach, sigma_to_show_above(campaign))
     return tuple(name for name in theory.not_estimable if name in model.parameter_names)
-
-
-def _sigmas(
-    known: Knowledge, unit: float, sigma_dof: float, refuted: bool
-) -> tuple[float | None, float | None]:
-    """Noise of a position by the residuals, and that by which the accuracy is judged, m/s²."""
-    omega, r = known.omega, known.redundancy
-    seen = unit * float(np.sqrt(omega / r)) if known.determined and r > 0 else None
-    largest = unit * float(np.sqrt(bound(omega, r, sigma_dof)))
-    return seen, seen if refuted else largest if np.isfinite(largest) else None
 
 
 def next_holds(campaign: Campaign, directions: Array) -> HoldConditions:
