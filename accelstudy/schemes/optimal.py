@@ -58,9 +58,9 @@ def _stored(n: int, criterion: str) -> Array:
     table = stored_designs()[criterion]
     if n not in table:
         raise InputError(
-            f"not stored; {criterion}-optimal are {ranges(table)} positions. Others are found by "
-            f"accelstudy design --positions {n} --criterion {criterion} --approach gravity "
-            "--out mine.yaml"
+            f"{criterion.lower()}-optimal-{n} is not stored; {criterion}-optimal are "
+            f"{ranges(table)} positions. Others are found by accelstudy design --positions {n} "
+            f"--criterion {criterion} --approach gravity --out mine.yaml"
         )
     return np.array(table[n]["directions"])
 
