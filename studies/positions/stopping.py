@@ -11,6 +11,7 @@ import hashlib
 from itertools import product
 from typing import Any
 
+from functools import partial
 import numpy as np
 import pandas as pd
 from matplotlib.figure import Figure
@@ -32,7 +33,7 @@ from accelstudy.leveling.angles import angles_of, tilt_slope
 from accelstudy.schemes import get_scheme
 from accelstudy.sensors.models import NINE, get_model
 from accelstudy.sequential import choice
-from accelstudy.sequential.promise import Promise, bound, known_variance
+from accelstudy.sequential.promise import Promise, bound
 from accelstudy.simulation.sessions import Noise
 
 MODEL = get_model(NINE)  # of the sensor and of the calibration
@@ -53,7 +54,7 @@ def plain(omega: ArrayLike, redundancy: int) -> Array:
 
 
 RULES: dict[str, tuple[Any, Any, str]] = {
-    "known": (known_variance, "-", "noise known"),
+    "known": (partial(bound, sigma_dof=np.inf), "-", "noise known"),
     "bound": (bound, "--", "upper bound from residuals"),
     "plain": (plain, ":", "as the residuals seem"),
 }
