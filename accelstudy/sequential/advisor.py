@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -121,6 +122,7 @@ def advise(
     trusted = stated if fit is None else fit.noise.trusted
     wrong = fit is not None and fit.state in (REJECTED, IMPLAUSIBLE)
     sigma_dof = (campaign.header if fit is None else fit.solution).sigma_dof if trusted else 0.0
+    upper_bound = partial(bound, sigma_dof=sigma_dof)
     noise = campaign_noise(campaign)
     if fit is not None:
         noise = replace(noise, sigma_force=fit.solution.sigma_force)
@@ -132,14 +134,14 @@ def advise(
         ),
         promise.tilt_error(model, at, campaign.gravity, campaign.hold if n else holds),
         promise,
-        sigma_dof,
+        upper_bound,
         typical_sizes(model, known.information.rows.shape[1]),
     )
     rms = chooser.rms(known)
     refuted = stated and not trusted
     if fit is not None and (refuted or np.isfinite(rms).all()):
-        upper = bound(*fit.solution.of_positions, sigma_dof)
-        judged = fit.noise if refuted else fit.noise._replace(variance=float(upper))
+        variance = float(upper_bound(*fit.solution.of_positions))
+        judged = fit.noise if refuted else fit.noise._replace(variance=variance)
         rms = replace(fit, judgement=judged).tilt_budget(promise.tilt_range).total
     enough = bool(promise.is_kept(rms)) and not wrong
 
@@ -152,7 +154,7 @@ def advise(
         to_go = chooser.positions_to_go(known, variance, rms, last)
     omega, r, unit = known.omega, known.redundancy, noise.sigma_force
     seen = unit * float(np.sqrt(omega / r)) if known.determined and r > 0 else None
-    largest = unit * float(np.sqrt(bound(omega, r, sigma_dof)))
+    largest = unit * float(np.sqrt(upper_bound(omega, r)))
     advice = Advice(
         session=campaign,
         model=model,

@@ -7,6 +7,7 @@ sensor is what is known of each beforehand. Both are designs of one step at a ti
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -18,7 +19,7 @@ from accelstudy.design.information import Information
 from accelstudy.design.spaces import find_attitudes
 from accelstudy.leveling.error import TiltError
 from accelstudy.sensors.sensor import SensorModel
-from accelstudy.sequential.promise import Promise, bound
+from accelstudy.sequential.promise import Promise
 
 EQUAL_GAIN = 0.99
 """Candidates whose gain is above this fraction of the largest are equally good, and the first is
@@ -101,7 +102,7 @@ class Chooser:
     rows : (k, c, u') array, their rows of the design matrix, at unit weight
     error : TiltError
     promise : Promise
-    sigma_dof : float, degrees of freedom of the stated noise, as `bound` takes them
+    variance : function of Ω and the redundancy: the variance of unit weight
     sizes : (u',) array, of the parameters in a cheap sensor
     """
 
@@ -109,12 +110,12 @@ class Chooser:
     rows: Array
     error: TiltError
     promise: Promise
-    sigma_dof: float
+    variance: Callable[[float, int], Array]
     sizes: Array
 
     def rms(self, known: Knowledge) -> Array:
         """Rms of roll and of pitch so far, (2,), rad; infinite where it is not known."""
-        variance = float(bound(known.omega, known.redundancy, self.sigma_dof))
+        variance = float(self.variance(known.omega, known.redundancy))
         if not (known.determined and np.isfinite(variance)):
             return np.full(2, np.inf)
         u = len(self.error.reference)

@@ -8,10 +8,10 @@ multiple of the tilt accuracy that a fixed scheme has.
 from __future__ import annotations
 
 import hashlib
+from functools import partial
 from itertools import product
 from typing import Any
 
-from functools import partial
 import numpy as np
 import pandas as pd
 from matplotlib.figure import Figure

@@ -1,5 +1,7 @@
 """Sessions that choose their positions and stop when the promised accuracy is reached."""
 
+from functools import partial
+
 import numpy as np
 import pytest
 from scipy import stats
@@ -35,7 +37,8 @@ def chooser(approach, scheme, directions=None, accuracy=10 * MGON):
     promise = Promise(accuracy, 30 * GON)
     rows = position_rows(NINE, get_approach(approach), Noise(), chosen)
     error = promise.tilt_error(NINE)
-    return Chooser(chosen, rows, error, promise, np.inf, typical_sizes(NINE, 9))
+    variance = partial(bound, sigma_dof=np.inf)
+    return Chooser(chosen, rows, error, promise, variance, typical_sizes(NINE, 9))
 
 
 def known(rows, determined):
