@@ -71,7 +71,8 @@ def find_source(code: Any) -> tuple[str, str]:
         return "", ""
     installed = (label(point) for point in _entry_points(tuple(sys.path)) if point.module == module)
     file = getattr(sys.modules.get(module), "__file__", None)
-    files = [os.path.relpath(file)] if file else []
+    # A class that a call makes has the module of its metaclass.
+    files = [os.path.relpath(file)] if file and module not in sys.stdlib_module_names else []
     return next(chain(_loading[-1:], installed, files, [module])), code.__qualname__
 
 
