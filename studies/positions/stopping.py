@@ -48,9 +48,7 @@ ROUNDING = 1e-9  # relative excess over the promise that is rounding
 
 def plain(omega: ArrayLike, redundancy: int) -> Array:
     """Variance of unit weight as the residuals seem to say, Ω/r."""
-    if redundancy < 1:
-        return np.full(np.shape(omega), np.inf)
-    return np.asarray(omega) / redundancy
+    return np.asarray(omega) / redundancy if redundancy > 0 else np.full(np.shape(omega), np.inf)
 
 
 RULES: dict[str, tuple[Any, Any, str]] = {
