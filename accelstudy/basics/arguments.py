@@ -55,7 +55,7 @@ def tidy(value: float, digits: int = 12) -> float:
     return float(f"{value:.{digits}g}") + 0.0  # -0.0 becomes 0.0
 
 
-def plain(value: Any) -> Any:
+def to_python(value: Any) -> Any:
     """Scalar of NumPy as that of Python; anything else as it is."""
     return value.item() if getattr(value, "shape", None) == () else value
 
@@ -63,7 +63,7 @@ def plain(value: Any) -> Any:
 def as_sequence(value: Any) -> Sequence[Any]:
     """One or several values as a sequence; a text is one, and so is an open file."""
     one = isinstance(value, str | bytes | Mapping | IOBase) or not hasattr(value, "__iter__")
-    return (value,) if one else tuple(map(plain, value))
+    return (value,) if one else tuple(map(to_python, value))
 
 
 def paths_of(given: Any, what: str, wanted: Callable[[str], bool]) -> list[Any]:

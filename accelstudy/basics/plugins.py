@@ -33,7 +33,6 @@ HOW = "; of a plug-in: import it, name it with --plugin or, in a configuration, 
 """What a message adds to the names that are known."""
 _CODE = (".py", ".yaml", ".yml", ".json", ".j2")
 
-
 _files: dict[str, str] = {}
 """Digest by name, of the files that are loaded."""
 _loading: list[str] = []
@@ -52,9 +51,9 @@ def cached_lookup(function: Lookup) -> Lookup:
     return _lookups[-1]
 
 
-def note_registration(kind: str, name: str, code: Any) -> None:
-    """Note what code of a plug-in registers."""
-    _sources[kind, name] = plugin, _ = find_source(code)
+def note_registration(kind: str, name: str, source: tuple[str, str]) -> None:
+    """Note what a plug-in registers, with its source as of `find_source`."""
+    _sources[kind, name] = plugin, _ = source
     if not _loading and os.path.isfile(plugin):  # an imported file
         _files[plugin] = _digest(Path(plugin).read_bytes())
     for lookup in _lookups:

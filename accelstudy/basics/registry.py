@@ -48,16 +48,17 @@ class Registry(Generic[Item]):
         InputError
             If its name is taken, or it is of a plug-in and cannot be used.
         """
-        code = code or type(item)
-        plugin = plugins.find_source(code)
-        if name in self._items and not (plugin[0] and plugin == plugins.source_of(self.kind, name)):
+        source = plugins.find_source(code or type(item))
+        of_plugin = bool(source[0])
+        again = of_plugin and source == plugins.source_of(self.kind, name)
+        if name in self._items and not again:
             raise InputError(f"the {self.kind} {name!r} is there already; choose another name")
-        if plugin[0]:
+        if of_plugin:
             with locate_errors(f"{self.kind} {name!r}"):
                 _check_complete(item)
                 if self._check:
                     self._check(item)
-            plugins.note_registration(self.kind, name, code)
+            plugins.note_registration(self.kind, name, source)
         self._items[name] = item
 
     @property

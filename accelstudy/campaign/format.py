@@ -15,7 +15,7 @@ from accelstudy.campaign.columns import KEYS, table_of
 from accelstudy.campaign.gross_errors.recognition import check_plausible
 from accelstudy.campaign.header import HEADER, TABLE, Header
 from accelstudy.campaign.session import Campaign
-from accelstudy.campaign.table import Table, columns_in_file, holds_in_file
+from accelstudy.campaign.table import Table, format_columns, parse_holds
 from accelstudy.files.outputs import write_text, write_yaml
 from accelstudy.files.reading import read_layer, read_text
 from accelstudy.files.validation import validate
@@ -126,7 +126,7 @@ def write_campaign(campaign: Campaign, folder: str | Path, plausible: bool = Tru
     header, path = campaign.header, folder / TABLE
     if campaign.reasons:
         header = campaign.with_header(excluded=campaign.exclusions).header
-    columns = columns_in_file(campaign.holds, header)
+    columns = format_columns(campaign.holds, header)
     _campaign_of(columns, header, path, plausible)
     write_text(path, pd.DataFrame(columns).to_csv(index=False, lineterminator="\n"))
     write_yaml(folder / HEADER, header.model_dump(mode="json", exclude_none=True, by_alias=True))
@@ -134,7 +134,7 @@ def write_campaign(campaign: Campaign, folder: str | Path, plausible: bool = Tru
 
 def _campaign_of(columns: Table, header: Header, path: Path, plausible: bool) -> Campaign:
     """Check the columns of the table `path`, and make a campaign of them and the header."""
-    campaign = Campaign(header, holds_in_file(columns, header, path))
+    campaign = Campaign(header, parse_holds(columns, header, path))
     if plausible:
         check_plausible(campaign, f"{path.with_name(HEADER)} and {path.name}")
     with locate_errors(path.with_name(HEADER)):

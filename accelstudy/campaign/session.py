@@ -18,7 +18,7 @@ from accelstudy.basics.wording import plural
 from accelstudy.campaign.columns import COLUMNS, split, table_of
 from accelstudy.campaign.header import Header
 from accelstudy.campaign.sensor_type import SensorType
-from accelstudy.campaign.table import columns_in_file, holds_in_file
+from accelstudy.campaign.table import format_columns, parse_holds
 from accelstudy.effects import HoldConditions
 from accelstudy.files.validation import validate
 
@@ -96,8 +96,8 @@ class Campaign:
         header = validate(Header, content, content.get("name", "campaign"))
         campaign = cls(header, table_of(arrays))
         if check:
-            columns = columns_in_file(campaign.holds, header)
-            campaign = cls(header, holds_in_file(columns, header, Path("campaign")))
+            columns = format_columns(campaign.holds, header)
+            campaign = cls(header, parse_holds(columns, header, Path("campaign")))
         return campaign.without_excluded()
 
     def __repr__(self) -> str:
@@ -214,15 +214,16 @@ class Campaign:
         arrays : by the names of the attributes, such as `forces` and `time`, in SI; None leaves
             the columns out
         """
-        holds = {name: self.holds[name].to_numpy() for name in self.holds}
-        holds["position"] = self.holds.index.to_numpy()
+        table = self.holds
+        holds = {name: table[name].to_numpy() for name in table}
+        holds["position"] = table.index.to_numpy()
         for attribute, values in arrays.items():
             if values is None:
                 for name in COLUMNS[attribute].names:
                     holds.pop(name, None)
                 continue
             for name, column in split(attribute, values, self.n_positions).items():
-                whole = np.array(holds.get(name, np.full(len(self.holds), np.nan)))
+                whole = np.array(holds.get(name, np.full(len(table), np.nan)))
                 whole[self.used] = column
                 holds[name] = whole
         index = pd.Index(holds.pop("position"), name="position")

@@ -19,7 +19,7 @@ Table = Mapping[str, Sequence[Any]]
 """The table of positions by name: texts of its file, or numbers that are to be written."""
 
 
-def columns_in_file(holds: pd.DataFrame, header: Header) -> dict[str, list[Any]]:
+def format_columns(holds: pd.DataFrame, header: Header) -> dict[str, list[Any]]:
     """Columns of a table of holds, in the units of the file."""
     table, holds = dict[str, list[Any]](), holds.reset_index()
     for attribute, columns in COLUMNS.items():
@@ -31,7 +31,7 @@ def columns_in_file(holds: pd.DataFrame, header: Header) -> dict[str, list[Any]]
     return table
 
 
-def holds_in_file(columns: Table, header: Header, path: Path) -> pd.DataFrame:
+def parse_holds(columns: Table, header: Header, path: Path) -> pd.DataFrame:
     """Check the columns of the table `path`, and make a table of holds of them."""
     if not any(map(len, columns.values())):
         raise InputError(f"{path}: no positions; expected one row per hold")

@@ -10,6 +10,7 @@ import pandas as pd
 
 from accelstudy.adjustment.quality import noncentrality, solve
 from accelstudy.approaches import Approach
+from accelstudy.basics.arguments import tidy
 from accelstudy.basics.arrays import Array
 from accelstudy.basics.shares import sigmas_95
 from accelstudy.basics.units import display_unit, to_display
@@ -177,8 +178,8 @@ def visibility_table(frame: SessionFit) -> pd.DataFrame:
                 "effect": row.name,
                 "part": effect.part,
                 "status": row.status,
-                "MDB": float(f"{to_display(row.mdb, unit):.3g}") if seen else np.nan,
-                "MIB": float(f"{to_display(row.mib, unit):.3g}") if seen else np.nan,
+                "MDB": tidy(float(to_display(row.mdb, unit)), 3) if seen else np.nan,
+                "MIB": tidy(float(to_display(row.mib, unit)), 3) if seen else np.nan,
                 "unit": display_unit(unit) if seen else "",
                 "with": "" if row.easiest is None else settings_text(row.easiest),
                 "confused with": row.reason or near,

@@ -9,7 +9,6 @@ from functools import cached_property
 
 import numpy as np
 
-from accelstudy.adjustment.observations import Known
 from accelstudy.basics.arrays import Array
 from accelstudy.basics.errors import InputError
 from accelstudy.basics.levels import MAX_TILT_GON
@@ -48,7 +47,7 @@ class LotCalibration:
 
     @classmethod
     def of(cls, diagnosis: LotDiagnosis, model: SensorModel) -> LotCalibration:
-        """Calibrate each sensor with what was found; what explains a part only is not."""
+        """Calibrate each sensor with all that was found, if that explains the lot."""
         fits, failed = dict[int, CampaignFit](), dict[str, str]()
         sensors = diagnosis.last.sensors
         models = models_with(diagnosis.effects, model, len(sensors))
@@ -120,15 +119,15 @@ class LotCalibration:
         roll, pitch = np.sqrt(np.maximum(np.mean(squares, axis=0), 0.0)) / MGON
         return Tilt(roll_mgon=roll, pitch_mgon=pitch, max_tilt_gon=MAX_TILT_GON)
 
-    def _expected(self, i: int) -> Known:
-        """Mean and sd of what a sensor has of the effects by the others, which may be nothing."""
+    def _expected(self, i: int) -> SensorType:
+        """What the others tell of the effects that a sensor has, which may be none."""
         expected = dict[str, tuple[float, float]]()
         for found in self.diagnosis.effects:
             p = max(float(found.having[i]), MIN_SHARE)
             for one in self.sizes(found):
                 square = one.scatter**2 + one.sigma**2 + (1 - p) * one.mean**2
                 expected[one.name] = (p * one.mean, float(np.sqrt(p * square)))
-        return expected
+        return SensorType("", len(self.usual), expected)
 
 
 def _parameters_of(found: LotEffect) -> Sequence[str]:
@@ -136,16 +135,17 @@ def _parameters_of(found: LotEffect) -> Sequence[str]:
     return () if found.spec is None else compose(found.spec, (found.spec,)).parameter_names
 
 
-def _squared_error(fit: CampaignFit, model: SensorModel, expected: Known) -> Array:
-    """Mean square of the tilt error of a model that lacks effects of which something is expected.
+def _squared_error(fit: CampaignFit, model: SensorModel, of_type: SensorType) -> Array:
+    """Mean square of the tilt error of a model that lacks effects of which a type tells something.
 
-    With what is expected as an observation, the estimates of the two models differ by the effects,
-    and not by the noise; the difference of covariances is what is not known of the effects.
+    With what the type tells as an observation, the estimates of the two models differ by the
+    effects, and not by the noise; the difference of covariances is what is not known of the
+    effects.
     """
-    of_type = replace(fit.campaign, sensor_type=SensorType("", len(expected), expected))
+    told = replace(fit.campaign, sensor_type=of_type)
     whole, base = (
         replace(fit_campaign(campaign, one, fit.approach), judgement=fit.noise)
-        for campaign, one in ((of_type, fit.model), (fit.campaign, model))
+        for campaign, one in ((told, fit.model), (fit.campaign, model))
     )
     f_b, hold = attitudes_in_use(fit.campaign.hold, fit.campaign.n_positions, fit.gravity)
     error = tilt_error(

@@ -361,7 +361,7 @@ def priors_of(names: Sequence[str]) -> dict[str, float]:
 
 
 def _count_certain(posterior: Sequence[float] | Array) -> int:
-    """How many names, the most probable first, hold the truth for certain; 1 if too many would."""
+    """Count the names, the most probable first, that surely hold the truth; 1 if too many would."""
     sums = np.cumsum(posterior[:MAX_NAMES])
     return 1 + int(np.argmax(sums >= MIN_CERTAIN)) if len(sums) else 0
 

@@ -26,8 +26,8 @@ from accelstudy.basics.arguments import (
     as_sequence,
     check_type,
     path_of,
-    plain,
     quantity,
+    to_python,
     whole_number,
 )
 from accelstudy.basics.bounds import Range
@@ -161,7 +161,7 @@ def pairs(example: str) -> Kind:
 
     def read(name: str, value: Any) -> dict[str, Any]:
         if isinstance(value, Mapping):
-            return {key: plain(said) for key, said in value.items()}
+            return {key: to_python(said) for key, said in value.items()}
         check_type(name, value, str, expected=f"a mapping, or a text as {example}")
         pairs = [part.split("=", 1) for part in value.split(",")]
         if any(len(pair) != 2 for pair in pairs):
@@ -316,7 +316,7 @@ class Keyword:
 
     def check(self, value: Any) -> Any:
         """Value as the verb works with it, quantities in SI; raises `InputError` if it is wrong."""
-        value = plain(value)
+        value = to_python(value)
         if self.optional and (value is None or (self.kind.name == "quantity" and value == "none")):
             return None
         if not (self.many or self.ends):

@@ -42,8 +42,8 @@ def test_usual_wrong_units_are_refused(wrong, tmp_path):
 
 
 def test_other_checks_stay_without_plausibility(tmp_path):
-    broken = CLEAN.with_arrays(forces=CLEAN.forces * [1, 0, 1])
-    with pytest.raises(InputError, match="fy: the same in all positions"):
+    broken = CLEAN.with_arrays(forces=np.where(np.arange(3) == 1, np.nan, CLEAN.forces))
+    with pytest.raises(InputError, match="fy: position 1: nan is no number"):
         write_campaign(broken, tmp_path, plausible=False)
 
 

@@ -11,6 +11,7 @@ import accelstudy as acs
 from accelstudy.approaches import get_approach
 from accelstudy.campaign.calibration.fit import fit_campaign
 from accelstudy.campaign.format import read_campaign, write_campaign
+from accelstudy.campaign.sensor_type import SensorType
 from accelstudy.lots.calibration import _squared_error
 from accelstudy.lots.evidence import Sensor
 from accelstudy.lots.lot import extended
@@ -69,7 +70,7 @@ def test_the_tilt_error_without_an_effect_is_that_of_sensors_without_noise():
                 seed=i, scheme="fibonacci-18", sigma=sigma, approach="gravity",
                 temperature=(5, 35), temperature_order="random", effects=(f"thermal_bias: {own}",),
             )  # fmt: skip
-            known = {f"b_T_{axis}": (3e-4, spread) for axis in "xyz"}
+            known = SensorType("", 30, {f"b_T_{axis}": (3e-4, spread) for axis in "xyz"})
             squares[k, i] = _squared_error(fit_campaign(campaign, whole), base, known)
     told, true = squares
     assert told.min() > 0

@@ -12,7 +12,7 @@ import pandas as pd
 from matplotlib.axes import Axes
 
 import accelstudy
-from accelstudy.basics.arguments import plain, quantity
+from accelstudy.basics.arguments import quantity, to_python
 from accelstudy.basics.arrays import CachedTable
 from accelstudy.basics.errors import InputError
 from accelstudy.basics.levels import MAX_TILT_GON, REFUTATION_LEVEL
@@ -37,7 +37,7 @@ from accelstudy.pages.result import Result
 from accelstudy.sensors.frames import axes_note
 
 TILT = InputQuantity("rad", 1e-3, np.pi / 2)
-LEVEL = InputQuantity("1", 0.0, 1.0, bare=True)
+LEVEL = InputQuantity("1", -np.inf, bare=True)
 MAX_ROWS = 200
 """Positions up to which the page lists all of them; of more, those that fit worst."""
 
@@ -130,7 +130,9 @@ class Calibration(Result):
         """
         from scipy import stats
 
-        level = quantity("level", plain(level), LEVEL)
+        level = quantity("level", to_python(level), LEVEL)
+        if not 0 < level < 1:
+            raise InputError(f"level: expected a probability between 0 and 1, not {level:g}")
         half = stats.t.ppf((1 + level) / 2, self.sensor.dof) * self.parameters["sigma"]
         value, unit = self.parameters["value"], self.parameters["unit"]
         return pd.DataFrame({"low": value - half, "high": value + half, "unit": unit})
