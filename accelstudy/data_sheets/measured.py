@@ -4,12 +4,13 @@ from __future__ import annotations
 
 import math
 from dataclasses import replace
+from operator import itemgetter
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 from scipy.optimize import nnls
 
+from accelstudy.basics.arrays import Array
 from accelstudy.basics.errors import InputError
 from accelstudy.campaign.format import read_campaign
 from accelstudy.campaign.importing.allan import MIN_DIFFERENCES, AllanDeviation
@@ -20,8 +21,13 @@ from accelstudy.effects import get_effect
 from accelstudy.epochs.course import YEAR
 from accelstudy.epochs.file_format import HistoryDocument
 
-MIN_VARIANCE_SHARE = 0.02
-"""A kind of noise must make up this part of the Allan variance at some averaging time."""
+MIN_GAIN = 2.71
+"""Gain in deviance from which on a kind of noise is there: χ² of a one-sided 5 %, of which white
+noise shows a random walk in 5 % of logs and a bias instability in 10 %."""
+INDEPENDENT_SHARE = 3 / 8
+"""Values of an Allan deviation within two octaves, eight of them, count as three."""
+MAX_STEPS = 50
+"""Steps in which the weights of a fit become those of what it expects."""
 
 
 def sheet_of_log(path: str | Path, settings: ImportSettings) -> DataSheet:
@@ -40,8 +46,8 @@ def sheet_of_log(path: str | Path, settings: ImportSettings) -> DataSheet:
 def sheet_of_allan(curve: AllanDeviation, name: str, source: str) -> DataSheet:
     """Fit σ²(τ) = N²/τ + (0.664 B)² + K²τ/3 to an Allan deviation.
 
-    None of the three is negative. Values are weighted by how well they are known: the relative
-    variance of σ² is two over the number of independent differences.
+    None of the three is negative, and B and K are there only if they explain the curve better than
+    chance would. A variance with ν degrees of freedom has a gamma distribution.
 
     Raises
     ------
@@ -52,18 +58,28 @@ def sheet_of_allan(curve: AllanDeviation, name: str, source: str) -> DataSheet:
     if np.count_nonzero(usable) < 3:
         raise InputError(f"{source}: too short at rest for an Allan deviation")
     tau, variance = curve.tau[usable], curve.pooled[usable] ** 2
+    dof = INDEPENDENT_SHARE * curve.deviation.shape[1] * curve.differences[usable]
     kinds = np.column_stack([1 / tau, np.ones_like(tau), tau])
-    weight = np.sqrt(curve.differences[usable] / 2) / variance
-    squares, _ = nnls(kinds * weight[:, None], variance * weight)
-    seen = np.max(kinds * squares / variance[:, None], axis=0) > MIN_VARIANCE_SHARE
-    longest = f"Allan deviation of {source} up to {tau[-1]:.3g} s"
-    values: dict[str, Any] = {
-        "velocity_random_walk": math.sqrt(squares[0]),
-        "bias_instability": math.sqrt(squares[1]) / FLICKER if seen[1] else None,
-        "acceleration_random_walk": math.sqrt(3 * squares[2]) if seen[2] else None,
-    }
-    if not seen[0]:
+
+    def fit(chosen: tuple[int, ...]) -> tuple[float, Array]:
+        """Deviance with a penalty for each kind of noise chosen, and the squares of all sizes."""
+        squares, expected = np.zeros(3), variance
+        for _ in range(MAX_STEPS):
+            weight = np.sqrt(dof) / expected
+            squares[[*chosen]], _ = nnls(kinds[:, chosen] * weight[:, None], variance * weight)
+            expected = kinds @ squares
+        deviance = np.sum(dof * (np.log(expected) + variance / expected))
+        return float(deviance) + MIN_GAIN * len(chosen), squares
+
+    _, (n, b, k) = min(map(fit, [(0,), (0, 1), (0, 2), (0, 1, 2)]), key=itemgetter(0))
+    if n == 0:
         raise InputError(f"{source}: no white noise in its Allan deviation; is it filtered?")
+    values = {
+        "velocity_random_walk": math.sqrt(n),
+        "bias_instability": math.sqrt(b) / FLICKER or None,
+        "acceleration_random_walk": math.sqrt(3 * k) or None,
+    }
+    longest = f"Allan deviation of {source} up to {tau[-1]:.3g} s"
     sources = {key: longest for key, value in values.items() if value is not None}
     return DataSheet(name, f"the sensor of {source}", longest, **values, sources=sources)
 

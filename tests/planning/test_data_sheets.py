@@ -8,6 +8,7 @@ import pytest
 from calling import refusal, succeed
 
 from accelstudy.basics.units import STANDARD_GRAVITY
+from accelstudy.campaign.importing.allan import pooled_deviation
 from accelstudy.data_sheets import (
     QUANTITIES,
     DataSheet,
@@ -16,7 +17,7 @@ from accelstudy.data_sheets import (
     parse_data_sheet,
     sheet_of_sigma,
 )
-from accelstudy.data_sheets.measured import with_history
+from accelstudy.data_sheets.measured import sheet_of_allan, with_history
 from accelstudy.data_sheets.sheet import FLICKER, flicker_change
 
 
@@ -128,6 +129,27 @@ def still_log(tmp_path_factory):
 
 
 READ = ("--rate", "20", "--columns", "fx=0,fy=1,fz=2")
+
+
+def test_white_noise_seldom_shows_another_and_a_random_walk_is_seen():
+    rng, (n, step, walk), seen = np.random.default_rng(2), (20_000, 0.01, 0.3), []
+    for _ in range(60):
+        white, steps = rng.standard_normal((2, n, 3))
+        white /= step**0.5
+        both = white + np.cumsum(walk * step**0.5 * steps, axis=0)
+        alone, found = (
+            sheet_of_allan(pooled_deviation([x], step), "s", "s") for x in (white, both)
+        )
+        assert alone.velocity_random_walk == pytest.approx(1.0, rel=0.03)
+        seen.append((
+            alone.bias_instability is not None,
+            alone.acceleration_random_walk is not None,
+            found.acceleration_random_walk or 0.0,
+        ))  # fmt: skip
+    flicker, drift, found = np.transpose(seen)
+    for count in (flicker.sum(), drift.sum()):
+        assert count <= 60 * 0.1 + 3 * np.sqrt(60 * 0.1 * 0.9)
+    assert found.mean() == pytest.approx(walk, abs=3 * found.std() / 60**0.5 + 0.05 * walk)
 
 
 def test_a_log_at_rest_makes_a_data_sheet_that_can_be_read(still_log, tmp_path):
