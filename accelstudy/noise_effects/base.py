@@ -12,6 +12,7 @@ from typing import ClassVar
 import numpy as np
 
 from accelstudy.basics.arrays import Array
+from accelstudy.basics.errors import InputError
 from accelstudy.basics.plugins import cached_lookup
 from accelstudy.basics.registry import RegistryWithSettings, WithSettings
 from accelstudy.effects import HoldConditions
@@ -55,8 +56,26 @@ class NoiseEffect(WithSettings):
         return np.ones(3)
 
 
+def _check(effect: NoiseEffect) -> None:
+    """Check that what a plug-in makes of noise or readings has their shape.
+
+    Raises
+    ------
+    InputError
+        If it has another.
+    """
+    zeros, each = np.zeros((2, 5, 3)), np.arange(5.0)
+    hold = HoldConditions(**dict.fromkeys(HoldConditions.columns(), each))
+    disturbed = effect.disturb(zeros, 1.0, hold, np.random.default_rng(1))
+    for name, array in (("disturb", disturbed), ("read", effect.read(zeros))):
+        if np.shape(array) != zeros.shape:
+            raise InputError(
+                f"{name} returns an array of shape {np.shape(array)} for one of {zeros.shape}"
+            )
+
+
 _registry: RegistryWithSettings[NoiseEffect] = RegistryWithSettings(
-    NoiseEffect.kind, "noise_effects"
+    NoiseEffect.kind, "noise_effects", _check
 )
 noise_effect_names = _registry.names
 register = _registry.register

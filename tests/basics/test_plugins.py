@@ -148,10 +148,13 @@ def test_a_scheme_without_directions_is_one_line():
         get_scheme("flat")
 
 
-def test_a_noise_effect_needs_no_setting():
+def test_a_noise_effect_needs_no_setting_and_keeps_the_shape_of_noise():
     double = {"name": "double", "equation": "2 v", "typical": (1, 1)}
     noise_effects.register(type("Double", (noise_effects.NoiseEffect,), double))
     assert catalogue("effects").loc["double", "typical"] == ""
+    sums = {**double, "disturb": lambda self, noise, sigma, hold, rng: noise.sum(axis=2)}
+    with pytest.raises(InputError, match=r"^noise effect 'sums': disturb returns .* \(2, 5\) "):
+        noise_effects.register(type("Sums", (noise_effects.NoiseEffect,), {**sums, "name": "sums"}))
 
 
 # --- configurations ------------------------------------------------------------------------------
