@@ -6,6 +6,7 @@ import math
 from dataclasses import replace
 from operator import itemgetter
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from scipy.optimize import nnls
@@ -74,7 +75,7 @@ def sheet_of_allan(curve: AllanDeviation, name: str, source: str) -> DataSheet:
     _, (n, b, k) = min(map(fit, [(0,), (0, 1), (0, 2), (0, 1, 2)]), key=itemgetter(0))
     if n == 0:
         raise InputError(f"{source}: no white noise in its Allan deviation; is it filtered?")
-    values = {
+    values: dict[str, Any] = {
         "velocity_random_walk": math.sqrt(n),
         "bias_instability": math.sqrt(b) / FLICKER or None,
         "acceleration_random_walk": math.sqrt(3 * k) or None,

@@ -7,7 +7,7 @@ other. Everything is in m/s², of R sessions of n holds with three axes.
 
 from __future__ import annotations
 
-from typing import ClassVar
+from typing import Any, ClassVar
 
 import numpy as np
 
@@ -64,8 +64,9 @@ def _check(effect: NoiseEffect) -> None:
     InputError
         If it has another.
     """
-    zeros, each = np.zeros((2, 5, 3)), np.arange(5.0)
-    hold = HoldConditions(**dict.fromkeys(HoldConditions.columns(), each))
+    zeros = np.zeros((2, 5, 3))
+    columns: dict[str, Any] = dict.fromkeys(HoldConditions.columns(), np.arange(5.0))
+    hold = HoldConditions(**columns)
     disturbed = effect.disturb(zeros, 1.0, hold, np.random.default_rng(1))
     for name, array in (("disturb", disturbed), ("read", effect.read(zeros))):
         if np.shape(array) != zeros.shape:

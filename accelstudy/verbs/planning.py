@@ -249,7 +249,8 @@ def simulate(
 ) -> Simulation:
     """Simulate the calibrations of one set-up, or of every combination of several.
 
-    A study of the workflow with the same cells, noise and seed gives the same numbers.
+    A study of the workflow with the same cells, noise and seed gives the same numbers. Effects that
+    need times or temperatures of holds take a study, whose configuration has `holds`.
 
     Parameters
     ----------
