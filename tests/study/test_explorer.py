@@ -23,12 +23,12 @@ KEYS = {
     "grids": [
         grid(
             [NINE, CROSS], ["mclaren-24", "icosahedron-12"], replicates=40,
-            sensor_sigma_mps2=[0.001, 0.002], robot_sigma_mgon=[0.32, 3.2],
+            robot_sigma_mgon=[0.32, 3.2],
         ),
     ],
     "leveling": {"attitudes": 10},
 }  # fmt: skip
-BLIND = 4
+BLIND = 2
 """Set-ups of the cross-axis model with gravity alone, which nothing can estimate."""
 DIGITS = 6e-4
 """Relative error of four digits."""
@@ -40,41 +40,19 @@ def study():
 
 
 @pytest.fixture(scope="module")
-def folder(tmp_path_factory):
-    return tmp_path_factory.mktemp("study")
+def tables(tmp_path_factory):
+    return run_study(tmp_path_factory.mktemp("study"), **KEYS)
 
 
 @pytest.fixture(scope="module")
-def tables(folder):
-    return run_study(folder, **KEYS)
+def page(study, tables):
+    return explorer_page(study, {name: tables[name] for name in TABLES})
 
 
-@pytest.fixture(scope="module")
-def written(study, tables, folder):
-    """Path of the page."""
-    path = folder / "explorer.html"
-    path.write_text(explorer_page(study, {name: tables[name] for name in TABLES}), "utf-8")
-    return path
-
-
-@pytest.fixture(scope="module")
-def page(written):
-    return written.read_text(encoding="utf-8")
-
-
-@pytest.fixture(scope="module")
-def other(study, tables, folder):
-    """Another page: all models have one title, which looks like markup, and angles are in degrees.
-
-    Of two set-ups some calibrations failed, and all have an infinite condition.
-    """
-    cells = tables["cells"].assign(condition=np.inf)
-    cells.loc[cells.index[cells["estimable"]][:2], "n_converged"] = [0, 7]
-    with pytest.MonkeyPatch.context() as patch, angles_in("deg"):
-        patch.setattr(content, "model_title", lambda name: "<b>mine</b>")
-        page = explorer_page(study, {**tables, "cells": cells})
-    (folder / "other.html").write_text(page, encoding="utf-8")
-    return page
+@pytest.fixture
+def one_title(monkeypatch):
+    """All models have one title, which looks like markup."""
+    monkeypatch.setattr(content, "model_title", lambda name: "<b>mine</b>")
 
 
 def charts(page):
@@ -147,9 +125,15 @@ def test_the_page_is_whole_and_the_same_again(page, study, tables):
     assert explorer_page(study, tables) == page
 
 
-def test_failures_models_of_one_title_and_degrees(other, tables):
+@pytest.mark.usefixtures("one_title")
+def test_failures_models_of_one_title_and_degrees(study, tables):
+    """Of two set-ups some calibrations failed, and all have an infinite condition."""
+    cells = tables["cells"].assign(condition=np.inf)
+    sound = cells.index[cells["estimable"]]
+    cells.loc[sound[:2], "n_converged"] = [0, 7]
+    with angles_in("deg"):
+        other = explorer_page(study, {**tables, "cells": cells})
     rows = table_of(other, "setups")
-    sound = tables["cells"].index[tables["cells"]["estimable"]]
     states = [f"{n} of 40 converged" for n in (0, 7, 40)]
     assert list(rows.loc[sound[:3], "state"]) == states
     assert rows["condition"].isna().all()
@@ -191,14 +175,6 @@ def tab():
         browser.close()
 
 
-@pytest.fixture
-def shown(tab, written):
-    """The page as it is first seen; at the end nothing is amiss."""
-    load(tab, written.as_uri())
-    yield tab
-    assert tab.amiss == []
-
-
 def load(tab, address):
     tab.goto("about:blank")
     tab.goto(address)
@@ -233,61 +209,53 @@ def choose(tab, value):
     tab.locator(".dtsp-searchPane td", has_text=value).first.click()
 
 
-def test_the_first_sight(shown, tables):
-    """And rows of charts by what is chosen."""
-    count(shown, 24)
-    table = rows(shown)
-    assert list(table["model"]) == [model_title(name) for name in tables["cells"]["model"][:6]]
+def test_a_choice_leaves_its_set_ups_shows_their_numbers_and_is_a_part_of_the_address(
+    tab, page, tables, tmp_path
+):
+    (tmp_path / "explorer.html").write_text(page, encoding="utf-8")
+    load(tab, (tmp_path / "explorer.html").as_uri())
+    count(tab, 12)
+    assert list(rows(tab)["model"]) == [model_title(name) for name in tables["cells"]["model"][:6]]
     # A ring, and a point for each set-up that can be estimated; the others have a cross.
-    points(shown, 2 * (24 - BLIND + 1))
+    points(tab, 2 * (12 - BLIND + 1))
     crosses = "#charts [aria-roledescription='text mark']:not([opacity='0'])"
-    assert shown.locator(crosses).count() == 2 * BLIND
-    shown.select_option("#by select", label="model")
-    shown.wait_for_selector(f"#charts text:has-text('{model_title(CROSS)}')")
+    assert tab.locator(crosses).count() == 2 * BLIND
+    # Rows of the charts.
+    tab.select_option("#by select", label="model")
+    tab.wait_for_selector(f"#charts text:has-text('{model_title(CROSS)}')")
+    # Set-ups that are left.
+    tab.get_by_text("Show All").click()
+    choose(tab, "12 icosahedron")
+    count(tab, 6)
+    choose(tab, "robot")
+    count(tab, 4)
+    points(tab, 2 * 4)
+    # Their order, and the one whose numbers are shown.
+    tab.locator(".dt-scroll-head th", has_text="roll rms").click()
+    left = tables["cells"].query("scheme == 'icosahedron-12' and approach == 'robot'")
+    of_left = tables["leveling"].query("cell in @left.cell").sort_values("roll_rms_mgon")
+    first = rows(tab)
+    same(first["roll rms / mgon"].astype(float), of_left["roll_rms_mgon"])
+    tab.locator("#setups tbody tr").nth(3).click()
+    assert tab.locator("#setups tr.selected").count() == 1
+    points(tab, 2 * (4 + 1))
+    said = tab.locator("#chosen").inner_text()
+    assert f"(in the tables {of_left['cell'].iloc[3]}): 40 of 40 converged" in said
+    # All again from the address.
+    load(tab, tab.url)
+    count(tab, 4)
+    pd.testing.assert_frame_equal(rows(tab), first)
+    assert tab.locator("#chosen").inner_text() == said
+    points(tab, 2 * (4 + 1))
+    assert tab.amiss == []
 
 
-def test_a_choice_leaves_its_set_ups_and_shows_their_numbers(shown, tables):
-    shown.get_by_text("Show All").click()
-    choose(shown, model_title(CROSS))
-    choose(shown, "12 icosahedron")
-    count(shown, 6)
-    choose(shown, "robot")
-    count(shown, 4)
-    points(shown, 2 * 4)
-    shown.locator("#setups tbody tr").first.click()
-    assert shown.locator("#setups tr.selected").count() == 1
-    points(shown, 2 * (4 + 1))
-    cells = tables["cells"].query("model == @CROSS and scheme == 'icosahedron-12'")
-    robot = cells.query("approach == 'robot'")["cell"].iloc[0]
-    assert f"(in the tables {robot}): 40 of 40 converged" in shown.locator("#chosen").inner_text()
-
-
-def test_what_is_chosen_is_a_part_of_the_address(shown, tables):
-    shown.get_by_text("Show All").click()
-    choose(shown, "robot")
-    count(shown, 16)
-    shown.locator(".dt-scroll-head th", has_text="roll rms").click()
-    expected = tables["leveling"].query("approach == 'robot'")["roll_rms_mgon"].sort_values()
-    first = rows(shown)
-    same(first["roll rms / mgon"].astype(float), expected[:6])
-    shown.locator("#setups tbody tr").nth(3).click()
-    said = shown.locator("#chosen").inner_text()
-    load(shown, shown.url)
-    count(shown, 16)
-    pd.testing.assert_frame_equal(rows(shown), first)
-    assert shown.locator("#chosen").inner_text() == said
-    points(shown, 2 * (16 + 1))
-
-
-def test_schemes_without_redundancy(tab, folder):
+@pytest.mark.usefixtures("one_title")
+def test_schemes_without_redundancy_and_names_that_are_no_markup(tab, tmp_path):
     keys = {"grids": [grid("bias-scale", ["faces-6", "fibonacci-6"], 2, approaches="gravity")]}
-    page = explorer_page(make_study(**keys), run_study(folder / "six", **keys))
-    (folder / "six.html").write_text(page, encoding="utf-8")
-    load(tab, (folder / "six.html").as_uri())
+    page = explorer_page(make_study(**keys), run_study(tmp_path, **keys))
+    (tmp_path / "six.html").write_text(page, encoding="utf-8")
+    load(tab, (tmp_path / "six.html").as_uri())
     points(tab, 2 * (2 + 1))
-
-
-@pytest.mark.usefixtures("other")
-def test_names_are_no_markup(tab, folder):
-    load(tab, (folder / "other.html").as_uri())
-    assert rows(tab)["model"][0].startswith("<b>mine</b>")
+    assert list(rows(tab)["model"]) == 2 * ["<b>mine</b>"]
+    assert tab.amiss == []
