@@ -232,15 +232,15 @@ def test_a_choice_leaves_its_set_ups_shows_their_numbers_and_is_a_part_of_the_ad
     points(tab, 2 * 4)
     # Their order, and the one whose numbers are shown.
     tab.locator(".dt-scroll-head th", has_text="roll rms").click()
-    left = tables["cells"].query("scheme == 'icosahedron-12' and approach == 'robot'")
-    of_left = tables["leveling"].query("cell in @left.cell").sort_values("roll_rms_mgon")
+    cells = tables["cells"].query("scheme == 'icosahedron-12' and approach == 'robot'")["cell"]
+    of_left = tables["leveling"].set_index("cell").loc[cells, "roll_rms_mgon"].sort_values()
     first = rows(tab)
-    same(first["roll rms / mgon"].astype(float), of_left["roll_rms_mgon"])
+    same(first["roll rms / mgon"].astype(float), of_left)
     tab.locator("#setups tbody tr").nth(3).click()
     assert tab.locator("#setups tr.selected").count() == 1
     points(tab, 2 * (4 + 1))
     said = tab.locator("#chosen").inner_text()
-    assert f"(in the tables {of_left['cell'].iloc[3]}): 40 of 40 converged" in said
+    assert f"(in the tables {of_left.index[3]}): 40 of 40 converged" in said
     # All again from the address.
     load(tab, tab.url)
     count(tab, 4)
