@@ -27,13 +27,10 @@ G = 9.81
 MGON = np.pi / 200 / 1000
 RANGES = {"temperature_degC": [10, 40], "time_s": [0, 1000], "vibration_mps2": [0, 0.5]}
 BEFORE = ("hysteresis", "settling")
-EFFECTS = [
+ALL = tuple(
     name for name in effect_names() if get_effect(name).part == "sensor" and name not in BEFORE
-]
-LAST = "saturation"
-ALL = tuple(EFFECTS)
+)
 SOME = [
-    *((*(name for name in EFFECTS[k::4] if name != LAST), LAST) for k in range(4)),
     ALL,
     ("thermal_bias(tau=300)",),
     ("learned(coordinate=temperature, low=10, high=40, length=1.5, amplitude=0.1)",),
@@ -43,7 +40,7 @@ SOME = [
     ("thermal_bias(tau=0.5)", "learned(coordinate=temperature rate, tau=100, length=1.5)"),
     ("bias", "scale", "nonorthogonality", "thermal_bias", "bias_drift", "vibration_rectification"),
 ]
-"""Effects, a few at a time, before one that acts last, all at once, and some shapes of them."""
+"""Effects, all at once, of which one acts last, some shapes, and some that need no search."""
 CONTENT = {
     "campaign": "made", "sensor": "a */ b", "model": "m", "approach": "gravity",
     "n_positions": 24, "quality": Quality(state="accepted"), "sigma_reading_mps2": 0.01,

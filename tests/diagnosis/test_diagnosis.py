@@ -50,7 +50,6 @@ HIDDEN = {
     "cubic_scale: 0.01, -0.01, 0.01": ("force", "bias"),
     "encoder_eccentricity: 1e-3, -9e-4, -9e-4, -9e-4": ("angle", "reading"),
     "axis_nonperpendicularity: 6e-4": None,
-    "bias_jump(t=750): 0.05, -0.05, 0.05": ("time", "bias"),
     "mounting_rotation: 2e-3, -2e-3, 2e-3": None,
     "saturation(knee=8): 0.02, 0.02, 0.02": ("force", "bias"),
     "vibration_rectification: 0.06, -0.06, 0.06": ("vibration", "bias"),

@@ -86,10 +86,6 @@ def test_a_maintainer_studies_an_effect_of_a_package(shell):
         shutil.copy(EXAMPLES / source, package / "our_sensors")
     shell.install(package)
     model = "bias-scale-nonorthogonality+ripple(period=5)"
-    shell(
-        "accelstudy simulate-campaign --scheme fibonacci-40 --out session "
-        '--effect "ripple(period=5): 0.006, -0.004, 0.005"'
-    )
     shell("accelstudy init my-study")
     config = shell.folder / "my-study" / "config" / "config.yaml"
     text = config.read_text(encoding="utf-8")
