@@ -65,9 +65,7 @@ class LogImport:
             from accelstudy.campaign.importing import segmentation_figure
             from accelstudy.drawing.saving import save_all
 
-            first = self.campaign.holds[["fx", "fy", "fz"]].to_numpy()[0]
-            offset = holds.means[0] - first
-            draw = {"segmentation": lambda: segmentation_figure.draw_segmentation(holds, offset)}
+            draw = {"segmentation": lambda: segmentation_figure.draw_segmentation(holds)}
             save_all(draw, folder, ["png"])
 
     def tell(self, place: Path) -> None:

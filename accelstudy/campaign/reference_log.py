@@ -15,6 +15,7 @@ from accelstudy.basics.arrays import Array
 from accelstudy.basics.errors import InputError, key
 from accelstudy.basics.units import GON
 from accelstudy.campaign.gross_errors.recognition import check_size
+from accelstudy.campaign.importing.columns import AXES
 from accelstudy.campaign.importing.holds import MAX_WANDER, Holds, reaches_range, scatter
 from accelstudy.campaign.importing.log import Log, join, read_log
 from accelstudy.campaign.importing.noise import hold_noise, sigma_text
@@ -105,15 +106,12 @@ class ReferenceLog:
     log: Log
     offset: float = 0.0
 
-    def angles_for(
-        self, holds: Holds, offset: Array, gravity: float
-    ) -> tuple[Holds, Array, ReferenceSensor, str]:
+    def angles_for(self, holds: Holds, gravity: float) -> tuple[Holds, Array, ReferenceSensor, str]:
         """Roll and pitch of the holds of a log, by the means of the reference in them.
 
         Parameters
         ----------
         holds : Holds
-        offset : (3,) array, m/s², of their means
         gravity : float, m/s²
 
         Returns
@@ -136,8 +134,8 @@ class ReferenceLog:
         means, used = np.array([records[n].mean(axis=0) for n in table.index]), table.left_out == ""
         with _remedy("names as ax [m/s^2] tell another unit than that of the log of `reference`"):
             check_size(f"{self.log.path}", means, gravity, self.log.layout.conversion)
-        own, forces = self.calibration.correct(means), table[["fx", "fy", "fz"]].to_numpy() - offset
-        frame = self._frame(forces[used], own[used])
+        own = self.calibration.correct(means)
+        frame = self._frame(table.loc[used, [*AXES]].to_numpy(), own[used])
         angles = angles_of(frame.to_frd(own))
         noise = hold_noise([records[n] for n in table.index[used]], self.log.step).accuracy.allan
         reference = ReferenceSensor(

@@ -47,9 +47,10 @@ def test_no_hold_is_said_to_be_shorter_than_the_shortest():
 
 
 def test_means():
-    log = table(np.eye(3)[:2], n=[400, 100], t=[1, 2], sx=0.02, sy=0.02, sz=0.02)
+    forces = np.array([[0.6, 0.0, 0.8], [0.0, 0.6, -0.8]])
+    log = table(forces, n=[400, 100], t=[1, 2], sx=0.02, sy=0.02, sz=0.02)
     campaign = acs.find_holds(log, means=True, unit="g", time="t")
-    np.testing.assert_allclose(campaign.forces, np.eye(3)[:2] * STANDARD_GRAVITY)
+    np.testing.assert_allclose(campaign.forces, forces * STANDARD_GRAVITY)
     np.testing.assert_allclose(campaign.sd, 0.02 * STANDARD_GRAVITY)
     assert campaign.positions.tolist() == [1, 2]
     assert campaign.n_samples.tolist() == [400, 100]

@@ -208,7 +208,9 @@ def _find(raw: RawTable, key: str, column: Place | None = None) -> int | None:
     """
     names, said = raw.names, str(column)
     if column is None:
-        places = time_columns(raw) if key == "time" else places_by_name(names, key)
+        places = places_by_name(names, key)
+        if key == "time" and not places:
+            places = sorted(raw.dates)
     elif raw.named and said in names:
         if names.count(said) > 1:
             raise InputError(f"{raw.path}: {key}: there are several columns {column!r}")
@@ -274,11 +276,6 @@ def places_by_name(names: Sequence[str], key: str) -> list[int]:
         if len(found) == 1:
             break
     return found
-
-
-def time_columns(raw: RawTable) -> list[int]:
-    """Places of the columns that may be the time: by their names, else those of dates."""
-    return places_by_name(raw.names, "time") or sorted(raw.dates)
 
 
 def thermometers(names: Sequence[str]) -> list[int]:

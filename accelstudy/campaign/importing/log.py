@@ -27,8 +27,6 @@ from accelstudy.campaign.importing.columns import (
     MEANS,
     NONE,
     resolve_layout,
-    time_columns,
-    unit_in,
     which_column,
 )
 from accelstudy.campaign.importing.formats import read_table, table_in_memory
@@ -45,11 +43,6 @@ MAX_NAMED = 3
 """Rows that are named of those left out."""
 GAP_RATIO = 5.0
 """A step of time that is this many times the usual one is a gap."""
-MAX_RATE_ERROR = 0.05
-"""Relative difference between a given rate and that of a column of time, from which on it is
-told."""
-MAX_JITTER = 0.05
-"""Mean deviation of the steps from whole periods, in periods, up to which a log is regular."""
 CLOCK_ENDS = (2**32, 86_400 * 10**9)
 """Ticks after which a clock begins anew: a counter of 32 bits, and a time of day in ns."""
 _USUAL_RATE = 100.0
@@ -71,6 +64,7 @@ class Log:
         s since the first row that has one, by the rate, or the number of the row where nothing
         tells it; fx, fy, fz, m/s², in forward, right, down; and the conditions, such as
         temperature, °C
+    tick : float, s, unit of its times in the file
     start : float, s, first time in the file; NaN without a column of time
     wrap : int, row at which its clock first began anew, and was counted on; None if it did not
     parts : tuple of Log, of which this one is joined; see `join`
@@ -81,6 +75,7 @@ class Log:
     layout: LogLayout
     places: Mapping[str, int]
     samples: CachedTable = CachedTable()  # noqa: RUF009
+    tick: float = 1.0
     start: float = np.nan
     wrap: int | None = None
     parts: tuple[Log, ...] = ()
@@ -162,7 +157,7 @@ class Log:
         """What could not be read."""
         if self.parts:
             return [line for part in self.parts for line in part.warnings()]
-        said = [*self.raw.warnings, *self._contradicted_rate()]
+        said = [*self.raw.warnings]
         if self.wrap is not None:
             where = self.describe(self.wrap, "time")
             said.append(f"the clock wraps around, and is counted on: {where}")
@@ -174,23 +169,6 @@ class Log:
                 f"{len(rows)} of {plural(len(self.lost), 'row')} left out, as a reading is missing "
                 f"or absurd: {each}{more}"
             )
-        return said
-
-    def _contradicted_rate(self) -> list[str]:
-        """Say that a column of time tells another rate than the one that was given."""
-        raw, rate = self.raw, self.layout.rate
-        if rate is None:
-            return []
-        said = []
-        for place in time_columns(raw):
-            unit = "ns" if place in raw.dates else unit_in(raw.names[place], "time")
-            times, _ = _counted_from_first(_ticks(raw, place))
-            step = UNITS["s"][unit or "s"] * np.median(np.diff(times))
-            if unit and step > 0 and abs(step * rate - 1) > MAX_RATE_ERROR:
-                said.append(
-                    f"column {raw.names[place]} tells {1 / step:.6g} samples per second, and "
-                    f"`rate` {rate:g} was taken"
-                )
         return said
 
     # --- what holds are looked for in ------------------------------------------------------------
@@ -256,17 +234,6 @@ class Log:
                 return mean
             kept = without
 
-    @cached_property
-    def missing(self) -> int:
-        """Number of samples that a regular log skipped between gaps; 0 if its steps jitter."""
-        if "time" not in self.places:
-            return 0
-        steps = np.diff(self.time)
-        periods = steps[steps <= GAP_RATIO * self.step] / np.median(steps)
-        whole = np.round(periods)
-        regular = np.mean(np.abs(periods - whole)) < MAX_JITTER
-        return int(np.sum(whole[whole > 1] - 1)) if regular else 0
-
     def unit_hint(self) -> str:
         """Hint at the unit of time that would give a usual rate; empty if the rate is usual.
 
@@ -275,11 +242,9 @@ class Log:
         of_format = self.raw.layout.get("time_unit") == self.layout.time_unit
         if "time" not in self.places or of_format:
             return ""
-        factor = _time_factor(self.raw, self.layout, self.places)
-        step = self.step / factor
-        rates = {unit: 1 / (step * UNITS["s"][unit]) for unit in CLOCK_UNITS}
+        rates = {unit: self.tick / (self.step * UNITS["s"][unit]) for unit in CLOCK_UNITS}
         unit = min(rates, key=lambda unit: abs(np.log(rates[unit] / _USUAL_RATE)))
-        if UNITS["s"][unit] == factor:
+        if UNITS["s"][unit] == self.tick:
             return ""
         return (
             f"; if its times are in {unit}, there are {rates[unit]:.4g} samples per second: give "
@@ -350,21 +315,18 @@ def read_log(
 
 def _convert(
     raw: RawTable, layout: LogLayout, places: Mapping[str, int]
-) -> tuple[pd.DataFrame, float, int | None]:
-    """Convert the columns of a log to SI; also its first time, and where its clock began anew."""
+) -> tuple[pd.DataFrame, float, float, int | None]:
+    """Convert the columns of a log to SI, with the unit, the first and a break of its times."""
     conditions = [key for key in places if key in CONDITIONS]
-    start, wrap, count = np.nan, None, len(raw.content)
+    tick, start, wrap, count = 1.0, np.nan, None, len(raw.content)
     columns = ["time", *AXES, *conditions]
     values = np.empty((len(columns), count))
     if "time" in places:
-        ticks, start = _counted_from_first(_ticks(raw, places["time"]))
-        factor, (ticks, wrap) = _time_factor(raw, layout, places), _count_on(ticks)
-        time = _usable(ticks) * factor
-        if "nanoseconds" in places:
-            time += 1e-9 * _usable(raw.numbers(places["nanoseconds"]))
-        first = next(iter(time[np.isfinite(time)]), 0.0)
-        start = start * factor + first
-        np.subtract(time, first, out=values[0])
+        ticks, tick = _ticks(raw, layout, places)
+        ticks, start = _counted_from_first(ticks)
+        ticks, wrap = _count_on(ticks)
+        start *= tick
+        np.multiply(_usable(ticks), tick, out=values[0])
     else:
         np.divide(np.arange(count), layout.rate or 1.0, out=values[0])
     frame, conversion, forces = layout.axes, layout.conversion, values[1:4]
@@ -381,12 +343,20 @@ def _convert(
     for condition, key in zip(values[4:], conditions, strict=True):
         condition[:] = _usable(raw.numbers(places[key]))
     pa.default_memory_pool().release_unused()
-    return pd.DataFrame(values.T, columns=columns, copy=False), start, wrap
+    return pd.DataFrame(values.T, columns=columns, copy=False), tick, start, wrap
 
 
-def _ticks(raw: RawTable, place: int) -> NDArray[Any]:
-    """Times of a column, (n,), in its unit; dates in ns since 1970."""
-    return raw.nanoseconds(place) if place in raw.dates else raw.numbers(place)
+def _ticks(
+    raw: RawTable, layout: LogLayout, places: Mapping[str, int]
+) -> tuple[NDArray[Any], float]:
+    """Times of a log, (n,), in its unit, and this unit, s; dates and stamps of ROS in ns."""
+    if places["time"] in raw.dates:
+        return raw.nanoseconds(places["time"]), 1e-9
+    times = raw.numbers(places["time"])
+    if "nanoseconds" not in places:
+        return times, UNITS["s"][layout.time_unit]
+    seconds = times.astype(np.int64) if times.dtype.kind in "iu" else times
+    return seconds * 10**9 + raw.numbers(places["nanoseconds"]), 1e-9
 
 
 def _count_on(ticks: Array) -> tuple[Array, int | None]:
@@ -398,13 +368,6 @@ def _count_on(ticks: Array) -> tuple[Array, int | None]:
     for end in CLOCK_ENDS:
         added[1:] += end * np.cumsum((steps + end > 0) & (steps + end <= GAP_RATIO * usual))
     return ticks + added, int(np.argmax(added > 0)) if added.any() else None
-
-
-def _time_factor(raw: RawTable, layout: LogLayout, places: Mapping[str, int]) -> float:
-    """S per unit of the column of time."""
-    if places["time"] in raw.dates:
-        return 1e-9
-    return UNITS["s"]["s" if "nanoseconds" in places else layout.time_unit]
 
 
 def join(logs: Sequence[Log]) -> Log:

@@ -16,13 +16,14 @@ from accelstudy.basics.units import MGON, UNITS, display_unit, to_display
 from accelstudy.basics.wording import short_list
 from accelstudy.campaign.gross_errors.recognition import check_plausible
 from accelstudy.campaign.header import LogLayout
-from accelstudy.campaign.importing.columns import ANGLES, MEANS, SDS, thermometers
+from accelstudy.campaign.importing.columns import ANGLES, AXES, MEANS, SDS, thermometers
 from accelstudy.campaign.importing.holds import Holds, find_blocks, find_holds
 from accelstudy.campaign.importing.log import AnyLog, Log, join, read_log
 from accelstudy.campaign.importing.noise import sigma_text, steps_text
 from accelstudy.campaign.importing.settings import ImportSettings
 from accelstudy.campaign.importing.windows import usual_window
 from accelstudy.campaign.session import Campaign
+from accelstudy.campaign.table import format_columns, parse_holds
 
 if TYPE_CHECKING:
     from accelstudy.campaign.reference_log import ReferenceLog
@@ -34,8 +35,6 @@ MAX_ACROSS_RATIO = 1.5
 """Noise across gravity, as a multiple of that along it, from which on a warning says that the
 sensor turns within its holds."""
 _YEARS = 1e8  # s; no session lasts for years, so later times count from 1970
-LONGEST_STEP = 3600.0
-"""s between the rows of a table of means, on average, from which on its unit of time is doubted."""
 _ON_EARTH = 9.76, 9.84
 """Gravity, m/s², with some room: from the highest mountain on the equator to the poles."""
 MIN_ROUNDING_RATIO = 0.1
@@ -76,14 +75,17 @@ def import_log(
     logs = cast(Sequence[AnyLog], log if isinstance(log, list | tuple) else [log])
     settings = settings or ImportSettings()
     _check_kinds(len(logs), settings, reference)
+    more = MEANS if settings.means else ()
+    read = [read_log(one, settings.layout, more=more) for one in logs]
+    for each in read:
+        each.check_units(each.conditions)
     if settings.means:
-        return _campaign_of_means(read_log(logs[0], settings.layout, more=MEANS), settings), None
-    read = [read_log(one, settings.layout) for one in logs]
+        return _campaign_of_means(read[0], settings), None
     if len(logs) == 1 and settings.block is None:
         read[0].check_timed()
     joined = join(read)
     in_blocks = settings.block is not None or (len(logs) > 1 and _are_short(joined, settings))
-    holds = (find_blocks if in_blocks else find_holds)(joined, settings)
+    holds = _with_offset((find_blocks if in_blocks else find_holds)(joined, settings))
     return _campaign_of_holds(holds, settings, reference)
 
 
@@ -144,20 +146,15 @@ def _campaign_of_means(log: Log, settings: ImportSettings) -> Campaign:
     for row in np.flatnonzero(rows.isna().any(axis=1)).tolist():
         key = next(key for key in log.unreadable(row) if key in rows)
         raise InputError(f"{log.path}: {log.describe(row, key)}, not a usable number")
-    columns = {key: rows[key].to_numpy() for key in log.conditions}
+    columns = {key: rows[key].to_numpy() for key in (*log.conditions, "n_samples") if key in rows}
     if "time" in rows:
         columns["time"] = rows["time"].to_numpy() + (log.start if abs(log.start) < _YEARS else 0.0)
-    if "n_samples" in rows:
-        columns["n_samples"] = n_samples = np.round(rows["n_samples"].to_numpy()).astype(int)
-        if np.any(n_samples < 1):
-            raise InputError(f"{log.path}: column n_samples: must be positive")
     sigma = None
     if {*SDS} <= {*rows}:
         sd = frame.to_frd_order(rows[[*SDS]].to_numpy() * abs(log.layout.conversion.scale))
         columns["sd"] = sd
-        if np.any(sd < 0):
-            raise InputError(f"{log.path}: columns {', '.join(SDS)}: must not be negative")
-        if "n_samples" in columns and np.any(sd > 0):
+        n_samples = columns.get("n_samples", np.zeros(1))
+        if np.all(n_samples > 0) and np.any(sd > 0):
             sigma = float(np.sqrt(np.mean(sd**2 / n_samples[:, None])))
             warnings.append("sigma of a mean assumes white noise; coloured noise makes it larger")
     if robot is not None:
@@ -168,19 +165,15 @@ def _campaign_of_means(log: Log, settings: ImportSettings) -> Campaign:
             columns["yaw"] = turned[:, 2]
     # Logs of the sensor have the unit and the axes of the table, but not its columns.
     shared = log.layout.model_dump(include={"unit", "scale", "offset", "frame"}, exclude_none=True)
-    header = _header(log, settings, LogLayout.model_validate(shared)) | {
+    header = _header(log, settings) | {
         "sensor_noise": None if sigma is None else {"sigma_mps2": sigma},
         "robot": None if robot is None else {"angle_sigma_mgon": tidy(robot / MGON)},
+        "log": LogLayout.model_validate(shared),
     }
     if robot is not None and "yaw" not in angles:
         warnings.append(
             "without the robot's yaw a base that is not level looks like noise; a column yaw, or "
             "`columns` yaw=NAME, tells it"
-        )
-    if "time" in rows and (step := float(np.ptp(rows["time"])) / len(rows)) > LONGEST_STEP:
-        warnings.append(
-            f"the rows are {step / 3600:.3g} h apart on average; is `time_unit` "
-            f"{log.layout.time_unit} right?"
         )
     shown = "unknown" if sigma is None else sigma_text(sigma)
     notes = (_columns_note(log, settings), f"{len(rows)} positions; sigma of a mean: {shown}")
@@ -201,25 +194,32 @@ def _columns_note(log: Log, settings: ImportSettings) -> str:
 # --- The campaign of holds -----------------------------------------------------------------------
 
 
+def _with_offset(holds: Holds) -> Holds:
+    """Holds of counts with an offset from the positions, unless it is given, or a bias alone."""
+    log, center = holds.log, holds.noise.center
+    layout, scale = log.layout, log.layout.conversion.scale
+    unknown = (layout.unit, layout.offset) == ("counts", None) and holds.noise.directed
+    if not unknown or np.linalg.norm(center) <= holds.radius / 2:
+        return holds
+    counts = np.round(layout.axes.from_frd(center) / scale)
+    zero, samples, table = layout.axes.to_frd(counts * scale), log.samples, holds.table.copy()
+    for each in (samples, table):
+        each[[*AXES]] -= zero
+    layout = layout.model_copy(update={"offset": counts.tolist()})
+    log = replace(log, layout=layout, samples=samples)
+    return replace(holds, log=log, table=table, noise=replace(holds.noise, center=center - zero))
+
+
 def _campaign_of_holds(
     holds: Holds, settings: ImportSettings, reference: ReferenceLog | None
 ) -> Imported:
     """Make the campaign of the holds of one sensor; its notes say how the log was read.
 
-    Counts without an offset get one from the positions, unless it is zero apart from the sensor's
-    bias. Holds that the reference does not cover are neither in the campaign nor in the holds.
+    Holds that the reference does not cover are neither in the campaign nor in the holds.
     """
-    log, layout, center = holds.log, holds.log.layout, holds.noise.center
-    columns: dict[str, Any] = {}
-    offset, sensor, note = np.zeros(3), None, ""
-    without_offset = layout.unit == "counts" and layout.offset is None and holds.noise.directed
-    if without_offset and np.linalg.norm(center) > holds.radius / 2:
-        scale = layout.conversion.scale
-        counts = np.round(layout.axes.from_frd(center) / scale)
-        layout = layout.model_copy(update={"offset": counts.tolist()})
-        offset = layout.axes.to_frd(counts * scale)
+    log, columns, sensor, note = holds.log, dict[str, Any](), None, ""
     if reference is not None:
-        angles_for = reference.angles_for(holds, offset, settings.gravity)
+        angles_for = reference.angles_for(holds, settings.gravity)
         holds, columns["angles"], sensor, note = angles_for
     table, noise = holds.table, holds.noise
     rounded = noise.rounding > MIN_ROUNDING_RATIO * noise.accuracy.allan
@@ -228,32 +228,26 @@ def _campaign_of_holds(
     known = [name for name in log.conditions if table[name].notna().all()]
     columns |= {name: table[name].to_numpy() for name in known}
     stated = {"sigma_mps2": noise.sigma, "degrees_of_freedom": max(1.0, float(round(noise.dof)))}
-    header = _header(log, settings, layout) | {
+    header = _header(log, settings) | {
         # Readings that never change within a hold do not show their noise, and those in a wrong
         # unit are refused by their size.
         "sensor_noise": stated if SIGMA_FORCE.least <= noise.sigma <= SIGMA_FORCE.most else None,
         "resolution_mps2": holds.windows.steps.tolist() if rounded else None,
         "reference": sensor,
     }
-    campaign = Campaign.of(
-        header,
-        check=False,
-        positions=table.index.to_numpy(),
-        forces=holds.means - offset,
-        n_samples=table["n"].to_numpy(),
-        sd=table[[*SDS]].to_numpy(),
-        **columns,
-    )
-    notes, warnings = _notes(holds, layout, note, rounded), _warnings(holds, settings.gravity)
-    campaign = _checked(replace(campaign, notes=notes, warnings=warnings), log, settings)
-    return campaign.without(holds.left_out), holds
+    columns |= {"forces": holds.means, "sd": table[[*SDS]].to_numpy()}
+    columns |= {"positions": table.index.to_numpy(), "n_samples": table["n"].to_numpy()}
+    notes, warnings = _notes(holds, note, rounded), _warnings(holds, settings.gravity)
+    campaign = replace(Campaign.of(header, check=False, **columns), notes=notes, warnings=warnings)
+    return _checked(campaign, log, settings).without(holds.left_out), holds
 
 
-def _header(log: Log, settings: ImportSettings, layout: LogLayout) -> dict[str, Any]:
+def _header(log: Log, settings: ImportSettings) -> dict[str, Any]:
     """Header of a campaign, as the settings say.
 
     Without a name it has that of the file without endings, or of the folder of several files.
     """
+    layout = log.layout
     name = Path(log.path.stem).stem if log.path.suffix == ".gz" else log.path.stem
     if len(log.parts) > 1:
         name = log.path.absolute().parent.name or name
@@ -275,8 +269,7 @@ def _header(log: Log, settings: ImportSettings, layout: LogLayout) -> dict[str, 
 
 
 def _checked(campaign: Campaign, log: Log, settings: ImportSettings) -> Campaign:
-    """Refuse forces nowhere near gravity and what is in another unit; add what is doubtful."""
-    log.check_units(log.conditions)
+    """Refuse a wrong unit, and what no campaign can have; add what is doubtful."""
     doubts = check_plausible(campaign, f"{log.path}", settings.robot_unit)
     given = "gravity" in settings.model_fields_set
     note = f"gravity: {campaign.gravity:.9g} m/s²{'' if given else ', as none was given'}"
@@ -286,8 +279,9 @@ def _checked(campaign: Campaign, log: Log, settings: ImportSettings) -> Campaign
             f"a gravity of {campaign.gravity:.9g} m/s² is that of no place on Earth, from {least} "
             f"to {most}; check `gravity`"
         )
-    warnings = (*campaign.warnings, *doubts)
-    return replace(campaign, notes=(*campaign.notes, note), warnings=warnings)
+    holds = parse_holds(format_columns(campaign.holds, campaign.header), campaign.header, log.path)
+    notes, warnings = (*campaign.notes, note), (*campaign.warnings, *doubts)
+    return replace(campaign, holds=holds, notes=notes, warnings=warnings)
 
 
 # --- What is said of it --------------------------------------------------------------------------
@@ -299,7 +293,7 @@ def _lines(*given: Any, **more: Any) -> tuple[str, ...]:
     return tuple(render_lines("campaign/importing/logs.txt.j2", *given, sigma=sigma_text, **more))
 
 
-def _notes(holds: Holds, layout: LogLayout, reference: str, rounded: bool) -> tuple[str, ...]:
+def _notes(holds: Holds, reference: str, rounded: bool) -> tuple[str, ...]:
     """How a log was read, and what was found in it, a line each."""
     log = holds.log
     time = log.time[holds.windows.about]
@@ -307,8 +301,7 @@ def _notes(holds: Holds, layout: LogLayout, reference: str, rounded: bool) -> tu
         "notes",
         holds,
         log,
-        layout=layout,
-        used={"time": "", "temperature": "", **layout.columns, **log.used},
+        used={"time": "", "temperature": "", **log.layout.columns, **log.used},
         heat=[log.raw.labels[place] for place in thermometers(log.raw.names)],
         reference=reference,
         seconds=time[-1] - time[0],

@@ -27,14 +27,12 @@ _DIGITS = 130
 shown."""
 
 
-def draw_segmentation(holds: Holds, offset: Array | float = 0.0) -> Figure:
-    """Draw specific forces less an offset, (3,), and the sd of the windows over time.
+def draw_segmentation(holds: Holds) -> Figure:
+    """Draw specific forces, and the sd of the windows, over time.
 
     Holds are shaded and numbered, those that are left out hatched.
     """
     edges, low, high = _envelope(holds)
-    low[:, :3] -= offset
-    high[:, :3] -= offset
     used, threshold = holds.used, holds.windows.threshold
     ends = holds.table[["t0", "t1"]].to_numpy()
     middle = (edges[:-1] + edges[1:]) / 2
