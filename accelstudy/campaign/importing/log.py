@@ -115,7 +115,7 @@ class Log:
         used = {*self.places.values()}
         return [label for place, label in enumerate(self.raw.labels) if place not in used]
 
-    @property
+    @cached_property
     def forces(self) -> Array:
         """Forces of the samples, (n, 3), m/s²; each axis in one piece."""
         return forces_of(self.samples)
@@ -253,7 +253,7 @@ class Log:
 
     # --- what is joined of parts -----------------------------------------------------------------
 
-    @property
+    @cached_property
     def time(self) -> Array:
         """Times of the samples, (n,), s."""
         return self.samples["time"].to_numpy()
