@@ -137,7 +137,7 @@ def judged(job):
     }
     of_type = 0.0 not in kind.shares
     has = {name: [any(e.name == name for e in t.effects) for t in truths] for name in classes}
-    odd = {int(one.campaign.split("-")[1]) - 1 for one in lot.odd}
+    odd = {*lot.odd}
     carriers = set() if of_type else {k for k, t in enumerate(truths) if t.effects}
     return {
         "kind": number,

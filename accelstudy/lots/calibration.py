@@ -61,7 +61,7 @@ class LotCalibration:
     @property
     def usual(self) -> dict[int, CampaignFit]:
         """Calibrations of the sensors that are not odd, by their numbers."""
-        return {i: self.fits[i] for i in self.diagnosis.usual if i in self.fits}
+        return {i: fit for i, fit in self.fits.items() if i not in self.diagnosis.odd}
 
     @cached_property
     def parameters(self) -> dict[str, TypeParameter]:
@@ -71,7 +71,7 @@ class LotCalibration:
         values, sigmas = np.full((2, n, model.n_parameters), np.nan)
         for i, fit in self.fits.items():
             values[i], sigmas[i] = fit.parameters, np.sqrt(self._variances(i, fit))
-        usual = np.isin(np.arange(n), diagnosis.usual)
+        usual = np.isin(np.arange(n), [*diagnosis.odd], invert=True)
         having = {
             name: np.array([found.names[0] in one.names for one in each])
             for found in diagnosis.effects

@@ -77,7 +77,7 @@ class Alternative(Part):
     posterior: float
 
 
-class Odd(Part):
+class OddSensor(Part):
     """A sensor with an effect that the others do not have, or have in another size.
 
     Attributes
@@ -94,7 +94,7 @@ class Odd(Part):
     by_size: bool
 
 
-class Each(Part):
+class SensorState(Part):
     """A sensor, given the lot.
 
     Attributes
@@ -108,7 +108,7 @@ class Each(Part):
     campaign: str
     names: list[str]
     posterior: float
-    failed: str | None
+    failed: str | None = None
 
 
 class LeftOut(Part):
@@ -164,8 +164,8 @@ class LotDocument(Document):
     explained: bool
     close: list[list[str]]
     alternatives: list[Alternative]
-    odd: list[Odd]
-    each: list[Each]
+    odd: list[OddSensor]
+    each: list[SensorState]
     left_out: list[LeftOut]
     tilt: Tilt | None
     verdict: str

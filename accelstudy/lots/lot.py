@@ -23,21 +23,10 @@ from accelstudy.campaign.calibration.fit import usual_approach
 from accelstudy.campaign.session import Campaign
 from accelstudy.diagnosis.decision.problem import BaseFit
 from accelstudy.lots.evidence import Sensor, SensorEvidence
+from accelstudy.lots.file_format import Alternative, OddSensor, SensorState
 from accelstudy.lots.noise import NoisePrior, noises_of_lot
-from accelstudy.lots.passes import (
-    LEVEL,
-    MIN_HAVING,
-    ODD,
-    Alternative,
-    LotEffect,
-    Mapped,
-    OddSensor,
-    Pass,
-    SensorState,
-    count_odd,
-    not_odd,
-)
-from accelstudy.sensors.models import compose, composition_name
+from accelstudy.lots.passes import LEVEL, MIN_HAVING, LotEffect, Mapped, Pass, called_odd
+from accelstudy.sensors.models import get_model
 from accelstudy.sensors.sensor import SensorModel
 
 Weighing: TypeAlias = Callable[[Sequence[LotEffect]], Pass]
@@ -47,6 +36,8 @@ LEVEL_OF_REST = 0.01
 """Level of the test whether the model of a lot lacks more than what was found."""
 END_WITH_PARENT = 1
 """Option of prctl(2) by which a process gets a signal when its parent ends, PR_SET_PDEATHSIG."""
+ODD = "odd"
+"""Name of an effect that one sensor has, and neither the model nor the other sensors."""
 MAX_EFFECTS = 3
 """Largest number of effects that are added to the model, one after the other."""
 
@@ -103,48 +94,43 @@ class LotDiagnosis:
         return bool(self.odd) and not self.effects and self.p_value_of_usual >= LEVEL
 
     @property
-    def state(self) -> str:
-        """State in a word, as the badge of the page has it."""
-        if not self.missing or self.only_odd:
-            return "no_effect"
-        return "named" if self.effects else "unknown"
-
-    @property
     def alternatives(self) -> list[Alternative]:
         """The most probable classes of what has no sure name, with their posterior."""
         return next((one for one in self.passes if one.missing), self.passes[-1]).alternatives
 
     @cached_property
-    def odd(self) -> list[OddSensor]:
-        """Odd sensors, the surest first: by what the others lack, or by the size of an effect."""
-        by_size = [
-            OddSensor(self.evidence[i].campaign, one.names, float(one.other_size[i]), by_size=True)
-            for one in self.effects
-            for i in np.argsort(-one.other_size, kind="stable")[: count_odd(one.other_size)]
-        ]
-        first = {one.campaign: one for one in (*by_size, *self.last.odd)}
-        return sorted(first.values(), key=lambda one: -round(one.posterior, 3))
+    def odd(self) -> dict[int, OddSensor]:
+        """Odd sensors by their numbers, the surest first.
 
-    @property
-    def usual(self) -> list[int]:
-        """Numbers of the sensors that are not odd."""
-        return not_odd(self.evidence, self.odd)
+        They are odd by what the others lack, or by the size of an effect.
+        """
+        by_size = {
+            i: OddSensor(
+                campaign=self.evidence[i].campaign,
+                posterior=one.other_size[i],
+                names=[*one.names],
+                by_size=True,
+            )
+            for one in self.effects
+            for i in called_odd(one.other_size)
+        }
+        every = {**by_size, **self.last.odd}
+        return dict(sorted(every.items(), key=lambda item: -round(item[1].posterior, 3)))
 
     @cached_property
     def each(self) -> list[SensorState]:
         """Names of what the model lacks for each sensor, and their posterior."""
         having = {one.names[0]: one.having for one in self.effects}
-        odd, states = {one.campaign for one in self.odd}, list[SensorState]()
+        states = list[SensorState]()
         usual = np.prod(
             [1 - self.last.posterior_odd, *(1 - one.other_size for one in self.effects)], 0
         )
         for i, (one, p_usual) in enumerate(zip(self.evidence, usual.tolist(), strict=True)):
             names = [name for name, p in having.items() if p[i] > MIN_HAVING]
             sure = math.prod(max(p[i], 1 - p[i]) for p in having.values())
-            if one.campaign in odd:
-                states.append(SensorState(one.campaign, (*names, ODD), sure * (1 - p_usual)))
-            else:
-                states.append(SensorState(one.campaign, tuple(names), sure * p_usual))
+            if i in self.odd:
+                names, p_usual = [*names, ODD], 1 - p_usual
+            states.append(SensorState(campaign=one.campaign, names=names, posterior=sure * p_usual))
         return states
 
 
@@ -252,8 +238,7 @@ def models_with(effects: Sequence[LotEffect], model: SensorModel, n: int) -> lis
 
 def extended(model: SensorModel, specs: Iterable[str]) -> SensorModel:
     """Model with further effects."""
-    effects = (*(effect.spec for effect in model.effects), *specs)
-    return compose(composition_name(compose("type", effects).effects), effects)
+    return get_model("+".join((*(effect.spec for effect in model.effects), *specs)))
 
 
 @contextmanager

@@ -17,7 +17,7 @@ is in the model.
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cached_property
 from typing import NamedTuple
 
@@ -72,12 +72,13 @@ class Mixture:
 
     prior: Mapping[str, float]
     own: Mapping[str, Array]
-    typical: Mapping[str, Sequence[TypicalSize]]
+    typical: Mapping[str, Sequence[TypicalSize]] = field(default_factory=dict)
 
     @cached_property
     def odd(self) -> Array:
-        """Log odds of each sensor to be odd, (n,)."""
-        return log_odd(self.prior, self.own)
+        """Log odds of each sensor to be odd, (n,), by the mean of all that could be missing."""
+        weighed = [self.own[name] + np.log(p) for name, p in self.prior.items()]
+        return np.asarray(np.log(PRIOR_ODD) + special.logsumexp(weighed, axis=0))
 
     @cached_property
     def nothing(self) -> LotEvidence:
@@ -143,9 +144,3 @@ class Mixture:
         has = posterior[:, None] * np.array([one.having for one in each])
         odd = posterior @ np.array([one.odd for one in each])
         return np.vstack([has, odd + (1 - posterior.sum()) * self.nothing.odd])
-
-
-def log_odd(prior: Mapping[str, float], own: Mapping[str, Array]) -> Array:
-    """Log odds of each sensor to be odd, (n,), by the mean of all that could be missing."""
-    weighed = [own[name] + np.log(p) for name, p in prior.items()]
-    return np.asarray(np.log(PRIOR_ODD) + special.logsumexp(weighed, axis=0))

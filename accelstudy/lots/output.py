@@ -122,7 +122,9 @@ class Lot(Result):
     @property
     def state(self) -> str:
         """One of no_effect, named, unknown."""
-        return self.diagnosis.state
+        if not self.diagnosis.missing or self.diagnosis.only_odd:
+            return "no_effect"
+        return "named" if self.diagnosis.effects else "unknown"
 
     @cached_property
     def sentences(self) -> list[str]:
@@ -136,7 +138,9 @@ class Lot(Result):
             d,
             either,
             closest=[either(names[:3]) for names in d.close],
-            alternatives=[f"{either(names[:3])} ({probability(p)})" for names, p in d.alternatives],
+            alternatives=[
+                f"{either(one.names[:3])} ({probability(one.posterior)})" for one in d.alternatives
+            ],
             tested_alone=sum(one.p_value < LEVEL for one in d.evidence),
             named_alone=sum(max(one.odds, key=one.odds.__getitem__) in first for one in d.evidence),
             missing=[either(one.names) for one in d.effects if one.spec],
@@ -154,8 +158,8 @@ class Lot(Result):
             "explained": d.explained,
             "close": d.close,
             "alternatives": d.alternatives,
-            "odd": d.odd,
-            "each": [one._replace(failed=failed.get(one.campaign)) for one in d.each],
+            "odd": [*d.odd.values()],
+            "each": [{**dict(one), "failed": failed.get(one.campaign)} for one in d.each],
             "left_out": [{"campaign": name, "reason": why} for name, why in self.left_out.items()],
             "tilt": self.calibration.tilt,
             "verdict": " ".join(self.sentences),

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Callable, Iterable, Iterator, Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import TYPE_CHECKING, Any, NamedTuple, TypeAlias
 
@@ -20,7 +20,8 @@ from accelstudy.diagnosis.rules import RULES
 from accelstudy.diagnosis.space.hypotheses import OUTLIER
 from accelstudy.effects import get_effect
 from accelstudy.lots.evidence import NOISE_PRIORS, Sensor, SensorEvidence, lot_classes
-from accelstudy.lots.mixture import Mixture, log_odd
+from accelstudy.lots.file_format import Alternative, OddSensor
+from accelstudy.lots.mixture import Mixture
 from accelstudy.lots.sizes import LotResiduals, ShownEffect
 
 if TYPE_CHECKING:
@@ -47,8 +48,6 @@ MAX_NAMES = 3
 EFFECT = "effect"
 WEIGHTS = {EFFECT: 1.0, UNKNOWN: RULES.prior_unknown, **NOISE_PRIORS}
 """Prior weights of what the model of a lot may lack, relative to one effect of the catalogue."""
-ODD = "odd"
-"""Name of an effect that one sensor has, and neither the model nor the other sensors."""
 MIN_HAVING = 0.5
 """Posterior probability from which a sensor counts among those that have an effect."""
 
@@ -88,47 +87,6 @@ class LotEffect(NamedTuple):
     def is_one_of(self, effects: Sequence[LotEffect]) -> bool:
         """Whether one of some effects has the same most probable name."""
         return self.names[0] in {one.names[0] for one in effects}
-
-
-class Alternative(NamedTuple):
-    """Names that mean the same in a lot, and how probable it is that the model lacks one."""
-
-    names: tuple[str, ...]
-    posterior: float
-
-
-class OddSensor(NamedTuple):
-    """A sensor that has an effect which the others do not have, or in another size.
-
-    Attributes
-    ----------
-    campaign : str
-    names : tuple of str, between which its campaign does not decide, the most probable first
-    posterior : float, to be odd
-    by_size : bool, whether the others have the effect, too
-    """
-
-    campaign: str
-    names: tuple[str, ...]
-    posterior: float
-    by_size: bool = False
-
-
-class SensorState(NamedTuple):
-    """What the model lacks for a sensor, and how probable that is.
-
-    Attributes
-    ----------
-    campaign : str
-    names : tuple of str
-    posterior : float
-    failed : str, why it has no calibration with the model of the type; None if it has one
-    """
-
-    campaign: str
-    names: tuple[str, ...]
-    posterior: float
-    failed: str | None = None
 
 
 @dataclass(frozen=True, eq=False)
@@ -200,13 +158,13 @@ class Pass:
         pattern = min(self.residuals.p_value_of_pattern, default=1.0) < LEVEL_OF_PATTERN
         prior = priors_of([name for name in self.classes if not pattern or name not in NOISES])
         own = {n: np.array([one.odds.get(n, 0.0) for one in self.evidence]) for n in prior}
-        odd, typical = log_odd(prior, own), {}
+        mixture, typical = Mixture(prior, own), {}
         for name in {*self.shown} & {*prior}:
-            sizes = self.residuals.typical(self.shown[name], odd)
+            sizes = self.residuals.typical(self.shown[name], mixture.odd)
             # What few sensors have, has no sizes of a type.
-            if max(sizes, key=lambda one: one.log_likelihood).share * len(odd) > self._few:
+            if max(sizes, key=lambda one: one.log_likelihood).share * len(self.sensors) > self._few:
                 typical[name] = sizes
-        return Mixture(prior, own, typical)
+        return replace(mixture, typical=typical)
 
     @property
     def _few(self) -> float:
@@ -227,7 +185,8 @@ class Pass:
     @property
     def p_value_of_usual(self) -> float:
         """That of the sensors which are not odd."""
-        return _smallest([*_combined([self.evidence[i] for i in self.usual]), *self._in_common])
+        usual = [one for i, one in enumerate(self.evidence) if i not in self.odd]
+        return _smallest([*_combined(usual), *self._in_common])
 
     @cached_property
     def _in_common(self) -> list[float]:
@@ -251,7 +210,8 @@ class Pass:
     @property
     def alternatives(self) -> list[Alternative]:
         """The most probable classes with their posterior, given that anything is wrong."""
-        return [Alternative(self.classes[name], p) for name, p in [*self.posterior.items()][:3]]
+        first = [*self.posterior.items()][:3]
+        return [Alternative(names=[*self.classes[name]], posterior=p) for name, p in first]
 
     @cached_property
     def found(self) -> LotEffect | None:
@@ -307,7 +267,7 @@ class Pass:
         *having, odd = self.mixture.sensors
         each = dict(zip(self.mixture.effects, having, strict=True))
         unnamed = sum((each[name] for name in each if name not in self._named), odd)
-        if count_odd(unnamed) <= self._few:
+        if len(called_odd(np.asarray(unnamed))) <= self._few:
             return np.asarray(unnamed)
         return np.asarray(sum((each[name] for name in self._rare), odd))
 
@@ -317,44 +277,38 @@ class Pass:
         return () if self.found is None else self.found.names
 
     @cached_property
-    def odd(self) -> list[OddSensor]:
-        """Odd sensors, the surest first; 5 of 100 are expected to be wrong."""
+    def odd(self) -> dict[int, OddSensor]:
+        """Odd sensors by their numbers, the surest first; 5 of 100 are expected to be wrong."""
         names = [name for name in self.mixture.own if name not in self._named]
         own = np.array([self.mixture.own[n] + np.log(self.mixture.prior[n]) for n in names])
-        # Sensors of which nobody doubts it stay in their order.
-        posterior = self.posterior_odd
-        order = np.argsort(-np.round(posterior, 3), kind="stable")[: count_odd(posterior)]
-        odd = list[OddSensor]()
-        for i in order:
+        odd = dict[int, OddSensor]()
+        for i in called_odd(self.posterior_odd):
             shares = special.softmax(own[:, i])
             first = np.argsort(-shares, kind="stable")
             first = first[: _count_certain(shares[first])]
-            members = tuple(member for k in first for member in self.classes[names[k]])
-            odd.append(OddSensor(self.evidence[i].campaign, members, float(posterior[i])))
+            odd[i] = OddSensor(
+                campaign=self.evidence[i].campaign,
+                posterior=self.posterior_odd[i],
+                names=[member for k in first for member in self.classes[names[k]]],
+                by_size=False,
+            )
         return odd
 
-    @property
-    def usual(self) -> list[int]:
-        """Numbers of the sensors that are not odd."""
-        return not_odd(self.evidence, self.odd)
 
+def called_odd(posterior: Array) -> list[int]:
+    """Numbers of the sensors that are called odd, the surest first, so that few are so wrongly.
 
-def not_odd(evidence: Sequence[SensorEvidence], odd: Iterable[OddSensor]) -> list[int]:
-    """Numbers of the sensors that are not odd."""
-    campaigns = {one.campaign for one in odd}
-    return [i for i, each in enumerate(evidence) if each.campaign not in campaigns]
-
-
-def count_odd(posterior: Array) -> int:
-    """How many sensors are called odd, by the posterior of each, so that few are so wrongly."""
+    posterior : (n,) array, of each sensor to be odd
+    """
+    # Sensors of which nobody doubts it stay in their order.
+    order = np.argsort(-np.round(posterior, 3), kind="stable")
     wrong = np.cumsum(np.sort(1 - posterior)) / np.arange(1, len(posterior) + 1)
-    return int(np.sum(wrong <= FALSE_ODD))
+    return [*map(int, order[: np.sum(wrong <= FALSE_ODD)])]
 
 
 def priors_of(names: Sequence[str]) -> dict[str, float]:
     """Prior probabilities of what the model of a lot may lack, the same for names of one kind."""
-    usual = {n: UNKNOWN if n.startswith(UNKNOWN) else EFFECT for n in names}
-    kinds = {name: name if name in WEIGHTS else kind for name, kind in usual.items()}
+    kinds = {n: kind if (kind := n.partition("(")[0]) in WEIGHTS else EFFECT for n in names}
     counts = Counter(kinds.values())
     total = sum(WEIGHTS[kind] for kind in counts)
     return {name: WEIGHTS[kind] / counts[kind] / total for name, kind in kinds.items()}

@@ -42,7 +42,7 @@ from accelstudy.effects import get_effect
 SCATTERS = (0.0, 0.25, 1.0)
 """τ, scatter of the parameters of a type in parts of their size; beyond, each sensor has its own
 size."""
-SHARES = (0.9, 0.35)
+FIRST_SHARES = (0.9, 0.35)
 """ρ from which the search begins: many sensors have the effect, or few."""
 MAX_STEPS = 60
 """Most steps of the search for μ and ρ."""
@@ -190,12 +190,12 @@ class LotResiduals:
         none, likelihood = np.full_like(odd, -np.inf), attrgetter("log_likelihood")
         most = [
             # If sizes differ much, each sensor looks odd beside their mean.
-            [self._search(effect, none, max(SCATTERS), x, effect.pooled / x) for x in SHARES]
+            [self._search(effect, none, max(SCATTERS), x, effect.pooled / x) for x in FIRST_SHARES]
             for effect in shapes
         ]
         best = max(range(len(shapes)), key=lambda i: max(map(likelihood, most[i])))
         effect = shapes[best]
-        starts = [(x, effect.pooled / x) for x in SHARES]
+        starts = [(x, effect.pooled / x) for x in FIRST_SHARES]
         starts += [(one.share, one.mean) for one in most[best]]
         return [
             max((self._search(effect, odd, τ, *start) for start in starts), key=likelihood)

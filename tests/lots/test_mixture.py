@@ -257,8 +257,8 @@ def test_what_the_lot_lacks_is_named_and_what_one_sensor_lacks_makes_it_odd():
     lot = LotDiagnosis((one, one), get_model("bias-scale"))
     assert lot.missing
     assert one.found is None
-    assert [(o.campaign, o.names) for o in lot.last.odd] == [("sensor 7", (NAMES[1],))]
-    assert [one.names for one in lot.each if one.names] == [("odd",)]
+    assert [(o.campaign, o.names) for o in lot.last.odd.values()] == [("sensor 7", [NAMES[1]])]
+    assert [one.names for one in lot.each if one.names] == [["odd"]]
     # The others show nothing.
     assert one.p_value_of_usual > one.p_value
 
@@ -269,7 +269,7 @@ def test_a_sensor_is_odd_though_a_second_one_shows_the_same_by_chance():
     odds[9, 1], odds[4, 1] = 35.0, 2.8
     one = weighed(odds, np.random.default_rng(6))
     assert one.found is None
-    assert [(o.campaign, o.names) for o in one.odd] == [("sensor 9", (NAMES[1],))]
+    assert [(o.campaign, o.names) for o in one.odd.values()] == [("sensor 9", [NAMES[1]])]
 
 
 def test_a_bumped_position_belongs_to_no_type_however_many_have_one():
@@ -277,14 +277,14 @@ def test_a_bumped_position_belongs_to_no_type_however_many_have_one():
     odds[[2, 7, 9], 1] = 15.0
     one = weighed(odds, np.random.default_rng(8), (NAMES[0], OUTLIER, NAMES[2]))
     assert one.found is None
-    assert {o.campaign: o.names for o in one.odd} == {f"sensor {i}": (OUTLIER,) for i in (2, 7, 9)}
+    assert {i: o.names for i, o in one.odd.items()} == {i: [OUTLIER] for i in (2, 7, 9)}
 
 
 def test_an_odd_sensor_has_the_names_between_which_its_campaign_does_not_decide():
     odds = np.full((12, 3), -1.0)
     odds[3, :2] = 20.0, 19.5
     one = weighed(odds, np.random.default_rng(9))
-    assert [(o.campaign, o.names) for o in one.odd] == [("sensor 3", NAMES[:2])]
+    assert [(o.campaign, o.names) for o in one.odd.values()] == [("sensor 3", [*NAMES[:2]])]
 
 
 def test_names_between_which_the_lot_does_not_decide_are_reported_as_one_set():

@@ -17,8 +17,9 @@ from accelstudy.campaign.calibration.fit import fit_campaign
 from accelstudy.campaign.format import write_campaign
 from accelstudy.campaign.sensor_type import SensorType, read_type
 from accelstudy.lots.calibration import LotCalibration
+from accelstudy.lots.file_format import SensorState
 from accelstudy.lots.noise import NoisePrior
-from accelstudy.lots.passes import LotEffect, SensorState
+from accelstudy.lots.passes import LotEffect
 from accelstudy.lots.type_file import write_type
 from accelstudy.schemes import get_scheme
 from accelstudy.sensors.models import get_model
@@ -46,8 +47,9 @@ def type_of(sensors, folder, effects=()):
     fits = {i: fitted(one) for i, one in enumerate(sensors)}
     named = [SimpleNamespace(noise=NoisePrior(0.002, 200.0)) for _ in sensors]
     lot = SimpleNamespace(
-        usual=range(len(sensors)), last=SimpleNamespace(sensors=named),
-        each=[SensorState(one.name, (), 1.0) for one in sensors], effects=effects, model=MODEL,
+        odd={}, last=SimpleNamespace(sensors=named),
+        each=[SensorState(campaign=one.name, names=[], posterior=1.0) for one in sensors],
+        effects=effects, model=MODEL,
     )  # fmt: skip
     assert write_type(LotCalibration(lot, MODEL, fits, {}), folder)
     return folder / "type.yaml"
