@@ -300,8 +300,8 @@ class CampaignDiagnosis:
         """
         if not self.finding.chosen:
             return None
-        base, extended, hold = self.base, self.final.solution, self.frame.hold
-        f_b, used = attitudes_in_use(hold, self.campaign.n_positions, extended.gravity)
+        base, extended = self.base, self.final.solution
+        f_b, used = attitudes_in_use(self.frame.hold, extended.gravity)
 
         def rms(right: Solution, fit: Solution) -> float:
             truth, u = right.parameters[: right.model.n_parameters], fit.model.n_parameters

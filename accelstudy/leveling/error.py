@@ -47,37 +47,27 @@ def cap_forces(max_tilt: float, attitudes: int, g: float = STANDARD_GRAVITY) -> 
     return force.reshape(-1, 3)[np.argsort(GOLDEN * np.arange(z.size) % 1)]
 
 
-def attitudes_in_use(hold: HoldConditions, n: int, g: float) -> tuple[Array, HoldConditions]:
-    """Return all tilts up to `MAX_TILT_GON`, and the conditions of a calibration in them.
+def attitudes_in_use(
+    hold: HoldConditions, g: float, max_tilt: float = MAX_TILT_GON * GON
+) -> tuple[Array, HoldConditions]:
+    """Return attitudes in which a sensor is used, in conditions like those of its calibration.
 
     Parameters
     ----------
-    hold : HoldConditions, of the n positions of the calibration
-    n : int
+    hold : HoldConditions, of the positions of the calibration, in their order
     g : float, m/s²
+    max_tilt : float, rad
 
     Returns
     -------
-    f_b : (k, 3) array, m/s²
+    f_b : (k, 3) array, m/s², over all tilts up to the largest
     HoldConditions
     """
-    f_b = cap_forces(MAX_TILT_GON * GON, ATTITUDES, g)
-    return f_b, holds_in_use(hold, n, f_b)
-
-
-def holds_in_use(hold: HoldConditions, n: int, f_b: Array) -> HoldConditions:
-    """Return conditions like those of a calibration, in attitudes in which the sensor is used.
-
-    Parameters
-    ----------
-    hold : HoldConditions, of the n positions of the calibration
-    n : int
-    f_b : (k, 3) array, m/s², of the attitudes
-    """
+    f_b = cap_forces(max_tilt, ATTITUDES, g)
     roll, pitch = roll_pitch(tuple(f_b.T))
-    used = hold.take(np.arange(len(f_b)) % n)
+    used = hold.take(np.arange(len(f_b)) % len(hold.column("order")))
     yaw = np.zeros(len(f_b)) if used.yaw is None else used.yaw
-    return replace(used, roll=roll, pitch=pitch, yaw=yaw)
+    return f_b, replace(used, roll=roll, pitch=pitch, yaw=yaw)
 
 
 @dataclass(frozen=True)

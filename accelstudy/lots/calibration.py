@@ -147,7 +147,7 @@ def _squared_error(fit: CampaignFit, model: SensorModel, of_type: SensorType) ->
         replace(fit_campaign(campaign, one, fit.approach), judgement=fit.noise)
         for campaign, one in ((told, fit.model), (fit.campaign, model))
     )
-    f_b, hold = attitudes_in_use(fit.campaign.hold, fit.campaign.n_positions, fit.gravity)
+    f_b, hold = attitudes_in_use(fit.campaign.hold, fit.gravity)
     error = tilt_error(
         fit.model, whole.parameters, model, base.parameters, f_b, fit.gravity, hold
     ).constant

@@ -24,7 +24,7 @@ from scipy import special
 from accelstudy.basics.arrays import Array
 from accelstudy.basics.units import STANDARD_GRAVITY
 from accelstudy.effects import HoldConditions
-from accelstudy.leveling.error import ATTITUDES, TiltError, cap_forces, holds_in_use, tilt_error
+from accelstudy.leveling.error import TiltError, attitudes_in_use, tilt_error
 from accelstudy.sensors.sensor import SensorModel
 
 LEVEL = 0.975
@@ -67,10 +67,9 @@ class Promise:
             Conditions of the positions, where effects depend on them; use is in like conditions.
         """
         at = np.zeros(model.n_parameters) if parameters is None else parameters
-        f_b = cap_forces(self.tilt_range, ATTITUDES, gravity)
-        if hold is not None and hold.order is not None:
-            hold = holds_in_use(hold, len(hold.order), f_b)
-        return tilt_error(model, at, model, at, f_b, gravity, hold)
+        of_one = HoldConditions(order=np.ones(1))
+        f_b, used = attitudes_in_use(hold or of_one, gravity, self.tilt_range)
+        return tilt_error(model, at, model, at, f_b, gravity, used)
 
     def is_kept(self, rms: Array) -> NDArray[np.bool_]:
         """Whether the rms of roll and of pitch, (..., 2), both keep the promise."""

@@ -19,7 +19,7 @@ from usual import NINE, G
 
 import accelstudy as acs
 from accelstudy.adjustment import calibrate
-from accelstudy.basics.units import GON, MGON, angles_in
+from accelstudy.basics.units import MGON, angles_in
 from accelstudy.basics.wording import number
 from accelstudy.campaign.format import write_campaign
 from accelstudy.diagnosis.decision.posterior import Posterior
@@ -32,7 +32,7 @@ from accelstudy.diagnosis.report.words import verdict_lines
 from accelstudy.diagnosis.result import CampaignDiagnosis, TiltErrors
 from accelstudy.diagnosis.rules import RULES
 from accelstudy.diagnosis.space.frame import SessionFit
-from accelstudy.leveling.error import cap_forces, holds_in_use
+from accelstudy.leveling.error import attitudes_in_use
 from accelstudy.simulation.sessions import Noise, session
 
 THERMAL = "thermal_bias: 0.003, -0.002, 0.001"
@@ -264,8 +264,7 @@ def simulated_sessions(simulated, fitted, d, count=200):
     drawn = ideal.draw(noise, count, np.random.default_rng(1))
     initial = fitted.parameters[: fitted.model.n_parameters]
     result = calibrate(fitted.model, d.base.approach, replace(drawn, initial=initial))
-    tilts = cap_forces(50 * GON, 60, G)
-    used = holds_in_use(d.frame.hold, d.campaign.n_positions, tilts)
+    tilts, used = attitudes_in_use(d.frame.hold, G)
     own = result.parameters[:, : fitted.model.n_parameters]
     error = leveling_error(simulated.model, p, fitted.model, own, tilts, G, used)
     return result.variance_posteriori, np.sqrt(np.mean(error.per_replicate**2))

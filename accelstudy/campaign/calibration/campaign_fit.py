@@ -18,7 +18,7 @@ from accelstudy.basics.units import GON
 from accelstudy.campaign.gross_errors.recognition import Recognition, recognise
 from accelstudy.campaign.session import Campaign
 from accelstudy.leveling.angles import tilt_by_output, tilt_slope
-from accelstudy.leveling.error import ATTITUDES, cap_forces, holds_in_use
+from accelstudy.leveling.error import attitudes_in_use
 from accelstudy.sensors.plausibility import implausible_parameters, implausible_tilt
 from accelstudy.sensors.sensor import SensorModel
 
@@ -263,8 +263,7 @@ class CampaignFit:
         uncertainty of the parameters does not contain it.
         """
         model, g = self.model, self.gravity
-        f_b = cap_forces(max_tilt, ATTITUDES, g)
-        hold = holds_in_use(self.campaign.hold, self.campaign.n_positions, f_b)
+        f_b, hold = attitudes_in_use(self.campaign.hold, g, max_tilt)
         p = np.where(model.stays, self.parameters, 0.0)
         in_use = model, p, model.sense(f_b, p, g, hold), f_b, g, hold
         slope, quoted = tilt_slope(*in_use) * model.stays, self.covariance
