@@ -20,6 +20,7 @@ from scipy import optimize
 from accelstudy.basics.arrays import Array
 from accelstudy.basics.units import GON, MGON
 from accelstudy.epochs.course import YEAR
+from accelstudy.leveling.error import TiltError
 
 if TYPE_CHECKING:
     from accelstudy.epochs.history import History
@@ -50,9 +51,9 @@ class Interval:
 
     def error(self, years: float) -> float:
         """Tilt error after some years that is not exceeded with the probability, rad."""
-        a, b, c = self._squares
-        larger = np.max(a + b * years + c * years**2, axis=1)
-        return float(np.sqrt(np.quantile(np.maximum(larger, 0.0), self.confidence)))
+        at_once, per_year = self._draws
+        squares = self._tilt.squares(self._tilt.reference + at_once + years * per_year)
+        return float(np.sqrt(np.quantile(squares.max(axis=1), self.confidence)))
 
     @property
     def until(self) -> str:
@@ -91,25 +92,14 @@ class Interval:
         return [{"years": t, "mgon": self.error(t) / MGON} for t in SHOWN_YEARS]
 
     @cached_property
-    def _squares(self) -> tuple[Array, Array, Array]:
-        """Squared errors of roll and pitch of the draws, (DRAWS, 2), as a + b t + c t², rad²."""
+    def _tilt(self) -> TiltError:
+        """Tilt error by errors of the last calibration."""
         values = self.history.estimates[-1]
-        form = self.history.tilt_error(values, values).quadratic
-        at_once, per_year = self._draw(np.einsum("auu->u", form))
-        first, second = (np.einsum("ku,auw->kaw", each, form) for each in (at_once, per_year))
-        return (
-            np.einsum("kaw,kw->ka", first, at_once),
-            2 * np.einsum("kaw,kw->ka", first, per_year),
-            np.einsum("kaw,kw->ka", second, per_year),
-        )
+        return self.history.tilt_error(values, values)
 
-    def _draw(self, weights: Array) -> tuple[Array, Array]:
-        """Error of the last calibration at once, and its growth per year, (DRAWS, u) each.
-
-        Parameters
-        ----------
-        weights : (u,) array, squared tilt error by a parameter that is wrong by 1
-        """
+    @cached_property
+    def _draws(self) -> tuple[Array, Array]:
+        """Error of the last calibration at once, and its growth per year, (DRAWS, u) each."""
         history, rng = self.history, np.random.default_rng(SEED)
         noise = np.array([_normal(rng, c) for c in history.covariances])
         at_once, per_year = noise[-1].copy(), np.zeros_like(noise[-1])
@@ -120,7 +110,7 @@ class Interval:
             per_year[:, k] = course.model.combination(scatter)[1] @ errors
             at_once[:, k] += sessions[-2] - sessions[-1]
         drift = np.array([course.rate.per_year for course in history.courses])
-        parts = weights * np.mean(at_once**2, axis=0)
+        parts = np.einsum("auu->u", self._tilt.quadratic) * np.mean(at_once**2, axis=0)
         freedom = np.array([course.model.dof for course in history.courses])
         dof = np.sum(parts) ** 2 / np.sum(parts**2 / freedom)
         factor = np.sqrt(dof / rng.chisquare(dof, DRAWS))[:, None]
