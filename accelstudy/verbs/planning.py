@@ -10,17 +10,19 @@ from accelstudy.basics import bounds
 from accelstudy.basics.arguments import path_of
 from accelstudy.basics.bounds import Range
 from accelstudy.basics.progress import stage
-from accelstudy.basics.units import GON, STANDARD_GRAVITY, InputQuantity
-from accelstudy.planning.quantities import MOST_POSITIONS, QUANTITIES, REPLICATES
+from accelstudy.basics.units import GON, MGON, STANDARD_GRAVITY, InputQuantity
 from accelstudy.verbs import kinds
 from accelstudy.verbs.kinds import Names, Quantity, angle, verb
 
 if TYPE_CHECKING:
     from accelstudy import Advice, Campaign, DataSheet, Design, Plan, Simulation
 
-Hold = Annotated[Quantity, QUANTITIES["hold"]]
-Sigma = Annotated[Quantity, QUANTITIES["sigma"]]
-RobotSigma = Annotated[Quantity, QUANTITIES["robot_sigma"]]
+DAY = 86400.0
+"""s"""
+Duration = Annotated[Quantity, InputQuantity("s", 0.01, DAY)]
+MovingTime = Annotated[Quantity, InputQuantity("s", most=3600.0)]
+Sigma = Annotated[Quantity, InputQuantity("m/s^2", 1e-9, 10.0)]
+RobotSigma = Annotated[Quantity, angle(1e-6 * MGON, 10 * GON)]
 Force = Annotated[Quantity, InputQuantity("m/s^2")]
 HalfTurn = Annotated[Quantity, angle(-200 * GON, 200 * GON)]
 QuarterTurn = Annotated[Quantity, angle(-100 * GON, 100 * GON)]
@@ -29,21 +31,21 @@ QuarterTurn = Annotated[Quantity, angle(-100 * GON, 100 * GON)]
 @verb
 def plan(
     *,
-    tilt_accuracy: Annotated[Quantity, QUANTITIES["tilt_accuracy"]],
-    tilt_range: Annotated[Quantity, QUANTITIES["tilt_range"]] = kinds.TILT_RANGE,
+    tilt_accuracy: Annotated[Quantity, angle(1e-4 * MGON, 100 * GON)],
+    tilt_range: Annotated[Quantity, angle(0.1 * GON, 90 * GON)] = kinds.TILT_RANGE,
     sensor: kinds.SensorName | None = None,
     sigma: Sigma | None = None,
     history: kinds.File | None = None,
     equipment: str = "both",
     confidence: Annotated[float | str, kinds.SHARE_OR_RMS] = "rms",
-    holds: Hold | Sequence[Hold] = (),
-    max_time: Annotated[Quantity, QUANTITIES["max_time"]] | None = None,
-    max_positions: Annotated[int, Range(*MOST_POSITIONS)] = 200,
-    replicates: Annotated[int, Range(*REPLICATES)] = 200,
+    holds: Duration | Sequence[Duration] = (),
+    max_time: Duration | None = None,
+    max_positions: Annotated[int, Range(4, 400)] = 200,
+    replicates: Annotated[int, Range(20, 1_000_000)] = 200,
     seed: kinds.Seed = 1,
-    moving_time: Annotated[Quantity, QUANTITIES["moving_time"]] = "20s",
-    robot_moving_time: Annotated[Quantity, QUANTITIES["robot_moving_time"]] = "10s",
-    robot_setup_time: Annotated[Quantity, QUANTITIES["robot_setup_time"]] = "30min",
+    moving_time: MovingTime = "20s",
+    robot_moving_time: MovingTime = "10s",
+    robot_setup_time: Annotated[Quantity, InputQuantity("s", most=DAY)] = "30min",
     robot_sigma: RobotSigma = "3.2mgon",
 ) -> Plan:
     """Find the cheapest calibration for a tilt accuracy.
