@@ -8,6 +8,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from accelstudy.basics.wording import words
 from accelstudy.effects import get_effect
 from accelstudy.leveling.distribution import NOISE, Tilt
 from accelstudy.planning.candidates import (
@@ -20,18 +21,6 @@ from accelstudy.planning.candidates import (
 )
 from accelstudy.planning.question import NONLINEAR, Question
 
-PLAIN = {
-    "nonorthogonality": "angles between the axes",
-    "cross_axis_misalignment": "rotation against the housing",
-    "quadratic_scale": "quadratic nonlinearity",
-    "cubic_scale": "cubic nonlinearity",
-    "mounting_rotation": "rotation of the sensor in its mount",
-    "base_tilt": "tilt of the robot's base",
-    "encoder_scale": "scale error of the robot's angles",
-    "encoder_offset": "zero error of the robot's angles",
-    "gravity_error": "wrong value of gravity",
-}
-"""Effects in plain words."""
 READING, HOURS, KELVIN = 1.0, 8.0, 10.0
 """Use: s of a reading, h since the calibration, and K off its temperature."""
 
@@ -52,11 +41,6 @@ class Spoiler:
     verdict: str
 
     @property
-    def plain(self) -> str:
-        """The effect in plain words."""
-        return PLAIN[self.effect]
-
-    @property
     def usual_sizes(self) -> tuple[float, float]:
         """Sizes in good and in cheap equipment, SI."""
         return get_effect(self.effect).typical
@@ -72,7 +56,7 @@ def limits(question: Question, candidate: Candidate) -> str:
     worse = int(np.argmax(candidate.tilt.rms))
     parts = {cause: each[worse] for cause, each in candidate.tilt.squares.items()}
     noise = parts.pop(NOISE)
-    by_words = {f"neglected {PLAIN[effect]}": square for effect, square in parts.items()}
+    by_words = {f"neglected {words(effect)}": square for effect, square in parts.items()}
     if candidate.equipment.name == "robot":
         quiet = _tilt(replace(question, sigma_angle=1e-12), candidate, {})
         robot = noise - quiet.squares[NOISE][worse]
@@ -82,7 +66,7 @@ def limits(question: Question, candidate: Candidate) -> str:
         white = min(1.0, walk**2 / candidate.hold / candidate.sigma**2)
         by_words["wander of the sensor's bias"], noise = noise * (1 - white), noise * white
     by_words["noise of the sensor"] = noise
-    return max(by_words, key=lambda words: by_words[words])
+    return max(by_words, key=by_words.__getitem__)
 
 
 def spoilers(question: Question, candidate: Candidate) -> list[Spoiler]:

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from accelstudy.basics.units import MGON, angle_note, display_unit  # noqa: F401
-from accelstudy.basics.wording import amount, quantity_text
+from accelstudy.basics.wording import amount, quantity_text, words
 from accelstudy.pages import render_lines
 from accelstudy.planning import reasons
 from accelstudy.planning.candidates import shortest  # noqa: F401
@@ -36,7 +36,7 @@ def assumed_sizes(question: Question) -> list[str]:
         effect: quantity_text(question.sizes[effect], reasons.effect_unit(effect))
         for effect in question.assumed
     }
-    return [f"{reasons.PLAIN[effect]} ({size})" for effect, size in sizes.items()]
+    return [f"{words(effect)} ({size})" for effect, size in sizes.items()]
 
 
 def table_lines(plan: Plan) -> list[str]:

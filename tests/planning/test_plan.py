@@ -171,7 +171,7 @@ def test_what_would_spoil_a_plan_is_of_the_size_that_leaves_the_target():
 
 def test_what_usually_spoils_a_plan_stands_beside_its_accuracy():
     result = answer(asked(equipment=(ROBOT,)), replicates=200)
-    assert "if there is no rotation of the sensor in its mount" in part_lines("answer", result)[1]
+    assert "if there is no mounting rotation" in part_lines("answer", result)[1]
 
 
 # --- words ---------------------------------------------------------------------------------------
