@@ -41,9 +41,10 @@ def random_directions(n, seed=1):
 
 
 @pytest.mark.parametrize("approach", ["gravity", "robot"])
-@pytest.mark.parametrize("noise", [Noise(), Noise(0.003, 1e-5, 1e-4, 2e-4)])
-@pytest.mark.parametrize("effects", ["cubic_scale+saturation+encoder_eccentricity",
-                                     "thermal_bias+base_tilt+hysteresis"])  # fmt: skip
+@pytest.mark.parametrize(("effects", "noise"), [
+    ("cubic_scale+saturation+encoder_eccentricity", Noise()),
+    ("thermal_bias+base_tilt+hysteresis", Noise(0.003, 1e-5, 1e-4, 2e-4)),
+])  # fmt: skip
 def test_the_rows_of_an_ideal_sensor_are_those_of_a_session_without_errors(
     approach, noise, effects
 ):

@@ -201,8 +201,7 @@ def test_an_edit_of_the_package_runs_what_depends_on_it(file, anew, single, tmp_
     assert planned(single).keys() == anew
 
 
-def test_another_leveling_or_seed_simulates_anew_and_a_further_model_alone(single):
-    assert "simulate" in planned(single, config={**TINY, "seed": 1})
+def test_another_leveling_simulates_anew_and_a_further_model_alone(single):
     assert "simulate" in planned(single, config={**TINY, "leveling": {"attitudes": 30}})
     grid = {**TINY["grids"][0], "models": [*MODELS, "bias-scale-nonorthogonality-cubic"]}
     assert planned(single, config={**TINY, "grids": [grid]})["simulate"] == 2

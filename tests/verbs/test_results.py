@@ -1,6 +1,5 @@
 """What verbs return: it says, shows, draws and saves itself, and is what the command gives."""
 
-import io
 import json
 import pickle
 import sys
@@ -269,28 +268,6 @@ def test_durations_are_times():
     assert acs.read_log(table).samples["time"].iloc[-1] == pytest.approx(len(table) / 100 - 0.01)
 
 
-@pytest.mark.parametrize(("verb", "given", "message"), [
-    (acs.find_holds, io.StringIO("fx,fy,fz\n" * 30000), "log: expected a path"),
-    (acs.batch, [], "expected one campaign or several"),
-    (acs.batch, [{}], "campaigns: expected Campaigns or their folders, not {}"),
-])  # fmt: skip
-def test_what_cannot_be_given_is_one_line(verb, given, message):
-    with pytest.raises(acs.InputError, match=f"^{message}"):
-        verb(given)
-
-
-@pytest.mark.parametrize(("arrays", "message"), [
-    ({"force": np.eye(3)}, "unknown array of a campaign 'force'; did you mean 'forces'"),
-    ({"time": [1, 2, 3]}, "forces: missing"),
-    ({"forces": np.diag([1, 1, np.nan])}, "campaign: fz: position 3: nan is no number"),
-    ({"forces": np.eye(3), "time": [2, 1, 3]}, "campaign: time_s: position 2: 1.0 is before"),
-    ({"forces": np.eye(3), "angles": np.zeros((3, 2))}, r"campaign.yaml: robot.angle_sigma_mgon"),
-])  # fmt: skip
-def test_a_campaign_of_arrays_is_checked(arrays, message):
-    with pytest.raises(acs.InputError, match=f"^{message}"):
-        acs.Campaign.of({"name": "mine", "gravity": {"value_mps2": 9.81}}, **arrays)
-
-
 def test_a_campaign_in_memory_is_as_its_folder(tmp_path):
     header = {"name": "mine", "gravity": {"value_mps2": 9.80665}, "robot": {"angle_sigma_mgon": 3}}
     header["excluded"] = [{"position": 2, "reason": "moved"}]
@@ -303,11 +280,6 @@ def test_a_campaign_in_memory_is_as_its_folder(tmp_path):
         for each in (campaign, tmp_path / "mine")
     )
     assert one.equals(other)
-
-
-def test_a_section_says_which_keys_it_has():
-    with pytest.raises(acs.InputError, match=r"^mine: gravity: .*\(value_mps2, sigma_mps2\)"):
-        acs.Campaign.of({"name": "mine", "gravity": 9.81}, forces=np.eye(3))
 
 
 def test_a_summary_has_no_empty_table(guide):
