@@ -3,36 +3,11 @@
 import importlib
 import re
 
-import pytest
-from calling import refused
 from places import ROOT
-from pydantic import BaseModel, Field, create_model
+from pydantic import BaseModel, create_model
 
 from accelstudy.basics.errors import InputError
 from accelstudy.files.validation import ConfigSection, validate
-
-
-class Grid(ConfigSection):
-    size: int = Field(ge=1)
-
-
-class Plan(ConfigSection):
-    grid: Grid
-    names: tuple[str, ...] = ()
-
-
-@pytest.mark.parametrize(("content", "key", "said"), [
-    ({"grid": {"size": 0}}, "grid.size", "must be at least 1, not 0"),
-    ({"grid": {"sise": 1, "size": 1}}, "grid.sise", "unknown key; did you mean 'size'? (known:"),
-    ({}, "grid", "must be given"),
-    ({"gird": {"size": 1}}, "gird", "unknown key; did you mean 'grid'? (known:"),
-    ({"grid": [1]}, "grid", "expected keys and values (size), not [1]"),
-    ({"grid": {"size": 0}, "names": 3}, "grid.size", "names)"),
-    (3, "", "expected keys and values (grid, names), not 3"),
-])  # fmt: skip
-def test_an_error_is_one_line_with_source_and_key(content, key, said):
-    with refused(said, start=f"plan.yaml: {key}{': ' if key else ''}"):
-        validate(Plan, content, "plan.yaml")
 
 
 def models():

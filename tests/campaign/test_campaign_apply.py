@@ -371,14 +371,6 @@ def test_a_log_without_names_is_written_with_places(plain, log, tmp_path, wanted
         np.testing.assert_allclose(calibrated_in(found), plain.correct(forces), atol=1e-9)
 
 
-def test_columns_of_the_campaign_that_a_log_lacks_are_said_to_come_from_there(plain, log, tmp_path):
-    mixed_log().to_csv(log, index=False)
-    layout = LogLayout(columns={"fx": "ax", "fy": "ay", "fz": "az", "temperature": "T"})
-    known = with_keys(plain, log=layout)
-    with pytest.raises(InputError, match=r"no column 'ax'.*log of the campaign, `columns`"):
-        level_log(known, log, tmp_path / "out.csv")
-
-
 def test_a_reading_at_the_end_of_the_range_is_no_measurement(plain, tmp_path):
     """A sensor that clips has no force for the readings that it clipped."""
     values = {"k_sat_x": 1.0, "k_sat_y": 1.0, "k_sat_z": 1.0}

@@ -10,7 +10,6 @@ from usual import GRAVITY, NINE
 
 import accelstudy as acs
 from accelstudy.adjustment import Observations, calibrate
-from accelstudy.basics.errors import InputError
 from accelstudy.campaign.calibration.fit import fit_campaign
 from accelstudy.campaign.calibration.sigma_check import check_sigmas
 from accelstudy.campaign.calibration.wording import sentences
@@ -85,8 +84,6 @@ def test_a_wrong_noise_does_not_show_in_simulation_and_is_said():
     assert "has the noise in the residuals" in found
     few = simulated_campaign({"b_x": 0.1}, scheme="d-optimal-9", noise=Noise(0.002))
     assert "nothing tells" in sentences(fit_campaign(few, NINE, GRAVITY), "finds")[0]
-    with pytest.raises(InputError, match="no sigma to check"):
-        check_sigmas(fit_campaign(few.with_sigma(None), NINE, GRAVITY))
 
 
 def test_residuals_tell_nothing_of_the_sigma_of_gravity():

@@ -41,12 +41,6 @@ def test_usual_wrong_units_are_refused(wrong, tmp_path):
     assert not (tmp_path / "refused").exists()
 
 
-def test_other_checks_stay_without_plausibility(tmp_path):
-    broken = CLEAN.with_arrays(forces=np.where(np.arange(3) == 1, np.nan, CLEAN.forces))
-    with pytest.raises(InputError, match="fy: position 1: nan is no number"):
-        write_campaign(broken, tmp_path, plausible=False)
-
-
 # --- recognition ---------------------------------------------------------------------------------
 
 TEMPERATURE = {"temperature": (10.0, 40.0), "temperature_order": "ABBA"}

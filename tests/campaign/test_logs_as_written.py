@@ -207,12 +207,6 @@ def test_dates_and_clocks_are_a_column_of_time(tmp_path, case):
         assert_timed(found(tmp_path / "log.parquet"))
 
 
-def test_dates_that_do_not_tell_month_and_day_apart_are_named(tmp_path):
-    frame = table(plain("%m/%d/%Y %H:%M:%S.%%"), names=("when", "ax", "ay", "az"))
-    said = refusal("import", written(tmp_path, rows_of(frame)), "--out", tmp_path / "out")
-    assert "column when: dates as 3/1/2024" in said
-
-
 @pytest.mark.parametrize("name", ["SN", "serial", "Serial No.", "Seriennummer", "sensor_id"])
 def test_rows_of_several_sensors_are_refused(name):
     """Sensors that were logged together would be taken for one whose readings are their mean."""
@@ -370,11 +364,6 @@ def test_a_bag_with_fewer_messages_than_it_says(tmp_path):
 
 
 # --- other rates, and a file for each position ---------------------------------------------------
-
-
-def test_noise_in_a_wrong_unit_is_no_motion():
-    with refused("these look like m/s^2, not g"):
-        acs.find_holds(table(), unit="g")
 
 
 CLOCKS = {

@@ -7,7 +7,6 @@ from hypothesis import strategies as st
 from usual import G
 
 from accelstudy.basics.units import MGON
-from accelstudy.effects import HoldConditions
 from accelstudy.schemes import get_scheme
 from accelstudy.sensors.models import MODELS, get_model
 from accelstudy.sensors.sensor import SensorModel
@@ -62,24 +61,6 @@ def test_a_model_of_the_axes_is_that_of_the_paper(name, data):
     np.testing.assert_allclose(model.axes_matrix(p), axes, rtol=0, atol=1e-14)
     expected = forces() @ (np.diag(1 + s) @ np.linalg.inv(axes)).T + b
     np.testing.assert_allclose(model.sense(forces(), p), expected, rtol=0, atol=1e-14 * G)
-
-
-@ALL_MODELS
-def test_generated_functions_equal_the_effects_in_numpy(name):
-    model = get_model(name)
-    p = random_parameters(model, seed=5)
-    f_b = forces()
-    own, start = [], 0
-    for effect in model.effects:
-        own.append((effect, tuple(p[start : start + len(effect.parameters)])))
-        start += len(effect.parameters)
-    matrix = np.eye(3) + sum(np.array(effect.axes(q, np), dtype=float) for effect, q in own)
-    f_a = tuple(np.linalg.inv(matrix) @ f_b.T)
-    expected = np.array(f_a)
-    for effect, q in own:
-        added = effect.output(f_a, q, G, HoldConditions(), np)
-        expected = expected + [np.broadcast_to(a, len(f_b)) for a in added]
-    np.testing.assert_allclose(model.sense(f_b, p), expected.T, rtol=0, atol=1e-14 * G)
 
 
 def test_vector_orders_a_mapping_and_fills_in_zeros():

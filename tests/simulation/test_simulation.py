@@ -1,4 +1,4 @@
-"""Simulated sessions: noise as ordered, reproducible draws, and what is known of the holds."""
+"""Simulated sessions: noise as ordered, reproducible draws."""
 
 import math
 
@@ -7,7 +7,6 @@ import pytest
 from usual import NINE, G
 
 from accelstudy.basics.units import MGON
-from accelstudy.effects import HoldConditions
 from accelstudy.leveling.angles import roll_pitch
 from accelstudy.schemes import get_scheme
 from accelstudy.simulation.sessions import Noise, session, sigma_of_mean
@@ -68,25 +67,3 @@ def test_a_wrong_gravity_is_believed_but_not_felt():
 )
 def test_sigma_of_the_mean_of_a_position(rate, duration, n):
     assert sigma_of_mean(0.02, rate, duration) == pytest.approx(0.02 / math.sqrt(n), rel=1e-14)
-
-
-# --- what is known of the holds ------------------------------------------------------------------
-
-
-def test_the_first_position_makes_no_step():
-    hold = IDEAL.hold
-    step = np.stack([hold.step_x, hold.step_y, hold.step_z], axis=1)
-    np.testing.assert_array_equal(step[1:], IDEAL.f_b[1:] - IDEAL.f_b[:-1])
-    np.testing.assert_array_equal(step[0], 0)
-
-
-def test_columns_of_the_caller_are_kept_beside_the_attitudes():
-    temperature, time = np.linspace(-5, 20, 24), 30.0 * np.arange(24)
-    known = session(
-        NINE, TRUTH, DIRECTIONS, hold=HoldConditions(temperature=temperature, time=time)
-    ).hold
-    np.testing.assert_array_equal(known.temperature, temperature)
-    np.testing.assert_array_equal(known.time, time)
-    assert known.vibration is None
-    np.testing.assert_array_equal([known.roll, known.pitch], IDEAL.angles.T)
-    assert draw(1).hold is IDEAL.hold

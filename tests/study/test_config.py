@@ -94,16 +94,6 @@ def test_config_yaml_has_every_top_level_key():
     assert set(yaml.safe_load(CONFIG.read_text())) == set(Study.model_fields)
 
 
-# --- bad input: what any file may have, tests/basics have -----------------------------------------
-
-
-def test_overlaid_files_are_all_named(tmp_path):
-    over = tmp_path / "over.yaml"
-    over.write_text("seed: -1\n")
-    with pytest.raises(InputError, match=rf"^{CONFIG}, {over}: seed: "):
-        read_study(CONFIG, over)
-
-
 # --- what is accepted ----------------------------------------------------------------------------
 
 

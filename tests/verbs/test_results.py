@@ -256,18 +256,6 @@ def test_numbers_may_be_those_of_numpy(guide):
     assert [date.year for date in acs.history(both, dates=dates).dates] == [2025, 2026]
 
 
-def test_names_of_columns_in_memory_may_be_numbers():
-    table = logged().set_axis([3, 1, 0], axis=1)
-    by_name = acs.read_log(table, rate=100, columns={"fx": 3, "fy": np.int64(1), "fz": 0})
-    assert by_name.samples[["fx", "fy", "fz"]].to_numpy() == pytest.approx(table.to_numpy())
-
-
-def test_durations_are_times():
-    table = logged()
-    table["time"] = pd.to_timedelta(np.arange(len(table)) / 100, unit="s")
-    assert acs.read_log(table).samples["time"].iloc[-1] == pytest.approx(len(table) / 100 - 0.01)
-
-
 def test_a_campaign_in_memory_is_as_its_folder(tmp_path):
     header = {"name": "mine", "gravity": {"value_mps2": 9.80665}, "robot": {"angle_sigma_mgon": 3}}
     header["excluded"] = [{"position": 2, "reason": "moved"}]

@@ -103,14 +103,6 @@ def test_a_message_calls_a_keyword_as_its_user_does() -> None:
     assert str(pickle.loads(pickle.dumps(command))) == str(command)
 
 
-@pytest.mark.parametrize("given", ["3", 3, "3:4:5", ("a", 1), "one:2"])
-def test_two_numbers_are_two(given: Any) -> None:
-    kind = kinds.numbers("two numbers, as 20:40", ":", 2)
-    assert kind.read("temperature", "20:40") == kind.read("temperature", (20, 40)) == (20.0, 40.0)
-    with pytest.raises(accelstudy.InputError, match="temperature: expected two numbers, as 20:40"):
-        kind.read("temperature", given)
-
-
 def test_a_number_without_a_unit_is_in_si_where_it_may_be() -> None:
     bare = kinds.si("m/s^2", 0, 100)
     assert [bare.read(text) for text in ("9.81", "981 mg", "1g")] == [
