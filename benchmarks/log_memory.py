@@ -2,7 +2,7 @@
 
     python benchmarks/log_memory.py [MILLIONS OF ROWS ...]
 
-Generates logs of as many rows (4 and 16 millions if none is given; a row has 25 bytes) in a folder
+Generates logs of as many rows (4 and 16 millions if none is given; a row has 28 bytes) in a folder
 that is removed afterwards, runs both commands on each as processes of their own, and prints the
 time of their processor, their largest resident memory, and what of this each row takes more than in
 the log before. `apply` writes four times what it reads, so the folder of temporary files (TMPDIR

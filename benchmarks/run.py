@@ -14,6 +14,7 @@ for variable in ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS"):
 
 import platform  # noqa: E402
 import sys  # noqa: E402
+from datetime import date  # noqa: E402
 from importlib.metadata import version  # noqa: E402
 from pathlib import Path  # noqa: E402
 
@@ -29,7 +30,7 @@ NAMES = ("machine", "precision", *(part.__name__ for part in PARTS))
 
 
 def machine():
-    """Say where and with what it ran."""
+    """Say when, where and with what it ran."""
     cpuinfo = Path("/proc/cpuinfo")
     names = cpuinfo.read_text().splitlines() if cpuinfo.exists() else []
     name = next((line.split(": ")[1] for line in names if line.startswith("model name")), "")
@@ -38,7 +39,7 @@ def machine():
     packages += [] if WAYS.get("numba").missing() else [f"numba {version('numba')}"]
     load = ", ".join(f"{each:.1f}" for each in os.getloadavg())
     return (
-        f"{name or platform.machine()}, {os.cpu_count()} cores, "
+        f"{date.today()}, {name or platform.machine()}, {os.cpu_count()} cores, "
         f"Python {platform.python_version()}, {', '.join(packages)}; "
         f"load at the start (1, 5, 15 minutes) {load}."
     )
