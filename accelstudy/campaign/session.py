@@ -9,7 +9,6 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-import pandas as pd
 from numpy.typing import NDArray
 
 from accelstudy.basics.arrays import CachedTable
@@ -214,20 +213,16 @@ class Campaign:
         arrays : by the names of the attributes, such as `forces` and `time`, in SI; None leaves
             the columns out
         """
-        table = self.holds
-        holds = {name: table[name].to_numpy() for name in table}
-        holds["position"] = table.index.to_numpy()
+        holds = self.holds
         for attribute, values in arrays.items():
-            if values is None:
-                for name in COLUMNS[attribute].names:
-                    holds.pop(name, None)
-                continue
-            for name, column in split(attribute, values, self.n_positions).items():
-                whole = np.array(holds.get(name, np.full(len(table), np.nan)))
-                whole[self.used] = column
-                holds[name] = whole
-        index = pd.Index(holds.pop("position"), name="position")
-        return replace(self, holds=pd.DataFrame(holds, index))
+            names = [*COLUMNS[attribute].names]
+            columns = holds.reindex(columns=names)
+            holds = holds.drop(columns=names, errors="ignore")
+            if values is not None:
+                changed = split(attribute, values, self.n_positions)
+                columns.loc[self.used] = np.column_stack([*changed.values()])
+                holds = holds.join(columns)
+        return replace(self, holds=holds)
 
     def with_sigma(self, sigma_force: float | None) -> Campaign:
         """Return the campaign with a noise of a position mean, m/s², that is known; None is not."""

@@ -184,10 +184,10 @@ def level_log(calibration: Any, log: Any, **keywords: Any) -> Leveling:
     """Level a log by the keywords of `apply`, checked."""
     from accelstudy.campaign.calibration.leveling import level
     from accelstudy.campaign.calibration.sensor_calibration import sensor_of
-    from accelstudy.campaign.importing.settings import layout_of
+    from accelstudy.campaign.importing.settings import settings_of
 
     sigma, start = keywords["sigma"], keywords["start"]
-    return level(sensor_of(calibration), log, layout_of(keywords), sigma, start)
+    return level(sensor_of(calibration), log, settings_of(keywords).layout, sigma, start)
 
 
 @verb

@@ -60,9 +60,9 @@ def read_log(
     """
     keywords = {**locals()}
     from accelstudy.campaign.importing.log import read_log
-    from accelstudy.campaign.importing.settings import layout_of
+    from accelstudy.campaign.importing.settings import settings_of
 
-    return read_log(log, layout_of(keywords))
+    return read_log(log, settings_of(keywords).layout)
 
 
 @verb

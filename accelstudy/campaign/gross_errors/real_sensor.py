@@ -99,7 +99,9 @@ class RealSensor:
         """Design (n, u), and what an ideal sensor lacks, (n, 3) or, of the norm alone, (n, 1)."""
         g, conditions = self.gravity, _conditions(self.campaign)
         if self.attitude:
-            ideal = attitude_forces(self.campaign)
+            assert self.campaign.angles is not None
+            roll, pitch = self.campaign.angles.T
+            ideal = np.column_stack(specific_force(roll, pitch, g))
             design = np.stack([*ideal.T / g, np.ones(len(ideal)), *conditions], axis=1)
             return design, (self.campaign.forces - ideal) / g
         # The norm of (I + D) f/g + c is 1: linear in the nine numbers of (I + D)ᵀ(I + D), c.
@@ -113,10 +115,11 @@ class RealSensor:
         """Parameters (u, 3) or, of the norm alone, (u, 1) of the fitted sensor."""
         return _robust(*self._design, np.inf if self.mounted else USUAL_SD)
 
-    @property
-    def _explained(self) -> Array:
-        """Part of that lack, of the same shape, that the fitted sensor explains."""
-        return np.asarray(self._design[0] @ self._parameters)
+    @cached_property
+    def _left(self) -> Array:
+        """Part of that lack, of the same shape, that the fitted sensor does not explain."""
+        design, lacking = self._design
+        return np.asarray(lacking - design @ self._parameters)
 
     @cached_property
     def strangeness(self) -> float:
@@ -136,17 +139,14 @@ class RealSensor:
     @cached_property
     def expected(self) -> Array | None:
         """What it reads in each position, (n, 3), m/s²; None where only the norm is known."""
-        if not self.attitude:
-            return None
-        return attitude_forces(self.campaign) + self.gravity * self._explained
+        return self.campaign.forces - self.gravity * self._left if self.attitude else None
 
     @cached_property
     def distance(self) -> Array:
         """Distance of each reading from what it should be, (n,), m/s²."""
-        if self.expected is not None:
-            return np.asarray(np.linalg.norm(self.campaign.forces - self.expected, axis=1))
-        squares = 1 - 2 * (self._design[1] - self._explained)[:, 0]
-        return self.gravity * np.abs(np.sqrt(np.maximum(squares, 0)) - 1)
+        if self.attitude:
+            return np.asarray(self.gravity * np.linalg.norm(self._left, axis=1))
+        return self.gravity * np.abs(np.sqrt(np.maximum(1 - 2 * self._left[:, 0], 0)) - 1)
 
     @property
     def tells(self) -> bool:
@@ -186,13 +186,6 @@ class RealSensor:
         if not self.attitude or self.usual_distance < MIN_POSITION_ERROR * self.gravity:
             return False
         return MIN_RATIO * self.free.usual_distance < self.usual_distance
-
-
-def attitude_forces(campaign: Campaign) -> Array:
-    """Return what an ideal sensor reads at the robot's angles, (n, 3), m/s²."""
-    assert campaign.angles is not None
-    roll, pitch = campaign.angles.T
-    return np.column_stack(specific_force(roll, pitch, campaign.gravity))
 
 
 def _conditions(campaign: Campaign) -> list[Array]:

@@ -24,19 +24,22 @@ from accelstudy.campaign.gross_errors.real_sensor import (
     MIN_RATIO,
     Correction,
     RealSensor,
-    attitude_forces,
 )
 from accelstudy.campaign.session import Campaign
 from accelstudy.leveling.angles import usual_norm
 from accelstudy.sensors.conversion import Conversion, conversion_of
 from accelstudy.sensors.plausibility import LARGEST
 
-EXCHANGES = [
-    np.eye(3)[:, axes] * signs
-    for axes in permutations(range(3))
-    for signs in product((1, -1), repeat=3)
-]
-"""All P with f = P f_read, where each channel shows one axis or its negative; the first is I."""
+EXCHANGES = sorted(
+    (
+        np.eye(3)[:, axes] * signs
+        for axes in permutations(range(3))
+        for signs in product((1, -1), repeat=3)
+    ),
+    key=lambda matrix: (np.sum(np.diag(matrix) == 0), np.sum(matrix < 0)),
+)[1:]
+"""All P with f = P f_read, where each channel shows one axis or its negative, but I; those that
+exchange the fewest axes, and then turn the fewest, come first."""
 GROSS_ERRORS = ("axis_error", "outlier_position", "row_order", "unit_error")
 """Names of the gross errors that are recognised."""
 MAX_ERRORS = 4
@@ -46,9 +49,6 @@ AS_GOOD = 1.25
 one is taken."""
 RIGHT_UNIT = 1 - LARGEST["scale"]
 """Share of gravity that even a bad sensor reads in the right unit."""
-MAX_AXIS_RATIO = 2.0
-"""Axes are tried if their distance from the ideal sensor is at most this many times the smallest
-distance of any axes."""
 MAX_EXCHANGED = 1000
 """Largest number of rows that are reordered; if more do not fit, their order is not the cause."""
 MIN_ANGLE_UNIT_RATIO = 2.0
@@ -269,25 +269,12 @@ def _is_clear(before: RealSensor, after: RealSensor) -> bool:
 
 
 def axes(sensor: RealSensor) -> Iterator[Correction]:
-    """Undo each of the 47 exchanges of axes that are likely."""
+    """Undo each of the 47 exchanges of axes."""
     campaign = sensor.campaign
     if campaign.angles is None or not sensor.is_far_off:
         return
-    ideal = attitude_forces(campaign)
-    # An ideal sensor with any bias is near enough to compare all quickly.
-    tried, misses = [], []
     for matrix in EXCHANGES:
-        for correction in filter(None, (_axes(campaign, matrix), _columns(campaign, matrix))):
-            error = correction.corrected.forces - ideal
-            bias = np.median(error, axis=0)
-            distance = np.linalg.norm(error - bias, axis=1)
-            misses.append(float(np.mean(np.minimum(distance, campaign.gravity))))
-            moved, turned = np.sum(np.diag(matrix) == 0), np.sum(matrix < 0)
-            tried.append(((moved, turned, np.linalg.norm(bias)), correction))
-    near = [
-        one for one, miss in zip(tried, misses, strict=True) if miss < MAX_AXIS_RATIO * min(misses)
-    ]
-    yield from (one for _, one in sorted(near, key=lambda one: one[0]) if one.reason)
+        yield from filter(None, (_axes(campaign, matrix), _columns(campaign, matrix)))
     # Where z points up, one of both has the other sign than in frd.
     log = campaign.header.log
     sign = 1.0 if log is None else np.prod(log.axes.signs[:2])
@@ -311,8 +298,7 @@ def columns_of_counts(sensor: RealSensor) -> Iterator[Correction]:
 
 def _axes(campaign: Campaign, matrix: Array) -> Correction:
     """Undo an exchange of axes."""
-    reason = _axes_in_words(matrix) if np.any(matrix != np.eye(3)) else ""
-    return Correction("axis_error", reason, _turned(campaign, matrix), matrix)
+    return Correction("axis_error", _axes_in_words(matrix), _turned(campaign, matrix), matrix)
 
 
 def _columns(campaign: Campaign, matrix: Array) -> Correction | None:

@@ -105,22 +105,12 @@ def settings_of(
     InputError
         One line that names the keyword, or the file and the key.
     """
-    path, own = given["settings"], _said(given, ImportSettings)
-    content = overlay({} if path is None else read_layer(path), {**(layout or {}), **own})
-    return validate(ImportSettings, content, path or "settings", names={k: key(k) for k in own})
-
-
-def layout_of(given: Mapping[str, Any]) -> dict[str, Any]:
-    """Keys of a layout that keywords say, checked; other keywords do not count."""
-    own = _said(given, LogLayout)
-    names = {name: key(name) for name in own}
-    return validate(LogLayout, own, "log", names=names).model_dump(exclude_unset=True)
-
-
-def _said(given: Mapping[str, Any], model: type[LogLayout]) -> dict[str, Any]:
-    """Keywords that say something and are keys of a model."""
-    return {
+    path = given.get("settings")
+    own = {
         name: list(value) if isinstance(value, tuple) else value
         for name, value in given.items()
-        if name in model.model_fields and not (value is None or value is False or value == ())
+        if name in ImportSettings.model_fields
+        and not (value is None or value is False or value == ())
     }
+    content = overlay({} if path is None else read_layer(path), {**(layout or {}), **own})
+    return validate(ImportSettings, content, path or "settings", names={k: key(k) for k in own})
