@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import cache
 from typing import Any
 
@@ -30,7 +30,6 @@ from accelstudy.planning.question import Equipment, Question
 from accelstudy.planning.simulated import simulate_candidate
 from accelstudy.positions.scheme_file import parse_scheme
 from accelstudy.sensors.models import get_model
-from accelstudy.sensors.sensor import SensorModel
 from accelstudy.simulation.sessions import Noise
 
 MAX_RANKED = 5
@@ -101,8 +100,7 @@ def _with_most_positions(question: Question, known: Sequence[Candidate]) -> list
         possible = [c for c in known if c.equipment == equipment]
         best = most_accurate(question, possible)
         if best is not None and not any(question.reached_by(c.tilt) for c in possible):
-            kind = CalibrationKind.of(question, best)
-            more.append(kind.best(kind.most))
+            more.append(in_best_positions(question, best, most_positions(question, best)))
     return [*known, *filter(None, more)]
 
 
@@ -116,121 +114,104 @@ def _confirm(plan: Plan, candidate: Candidate, first: bool) -> Candidate | None:
     first : bool, whether it is the first with its equipment: then its positions are searched with
         more care
     """
-    kind, starts = CalibrationKind.of(plan.question, candidate), STARTS if first else 1
+    question, starts = plan.question, STARTS if first else 1
     tried: Candidate | None = candidate
-    if candidate.starts not in (0, starts):
-        tried = kind.best(candidate.scheme.n_positions, starts)
+    if first and candidate.search is not None:
+        tried = in_best_positions(question, candidate, candidate.scheme.n_positions, starts)
     for _ in range(MAX_TRIES):
         if tried is None:
             break
-        simulated = simulate_candidate(plan.question, tried, plan.seed, plan.replicates)
-        if plan.question.accuracy(simulated) <= plan.question.target:
+        simulated = simulate_candidate(question, tried, plan.seed, plan.replicates)
+        if question.accuracy(simulated) <= question.target:
             return replace(tried, simulated=simulated)
-        tried = kind.best(tried.scheme.n_positions + 1, starts)
+        tried = in_best_positions(question, tried, tried.scheme.n_positions + 1, starts)
     return None
 
 
-@dataclass(frozen=True)
-class CalibrationKind:
-    """Calibrations that differ by their positions alone.
+def in_best_positions(
+    question: Question, like: Candidate, n: int, starts: int = 1
+) -> Candidate | None:
+    """Return a candidate in the best n positions; None if so many are not allowed, or too few.
 
-    Attributes
+    Parameters
     ----------
     question : Question
-    equipment : Equipment
-    model : SensorModel
-    hold : float, s
+    like : Candidate, which differs from it by its positions alone
+    n : int
+    starts : int, random sets from which the positions are searched
     """
+    if not least_positions(like) <= n <= most_positions(question, like):
+        return None
+    search = search_like(question, like, n)
+    directions = search.optimum(n, starts).tolist()
+    content = {"title": MINIMAX, "source": "accelstudy plan", "directions": directions}
+    scheme = parse_scheme(content, f"{MINIMAX}-{n}")
+    alone = replace(question, holds=(like.hold,), equipment=(like.equipment,))
+    found = next(in_scheme(alone, scheme, [like.model]), None)
+    return found and replace(found, search=search)
 
-    question: Question
-    equipment: Equipment
-    model: SensorModel
-    hold: float
 
-    @classmethod
-    def of(cls, question: Question, candidate: Candidate) -> CalibrationKind:
-        """The kind of a candidate."""
-        return cls(question, candidate.equipment, candidate.model, candidate.hold)
+def search_like(question: Question, like: Candidate, n: int) -> Search:
+    """Return the search for the best n positions of calibrations like a candidate."""
+    noise = Noise()
+    if like.equipment.name != "gravity":  # with a single noise the best positions are the same
+        sigma = sigma_of(question, like.equipment, n, like.hold)
+        noise = Noise(sigma, question.sigma_angle)
+    return _search(like.model.name, like.equipment.name, noise, question.tilt_range)
 
-    @property
-    def least(self) -> int:
-        """Number of positions with which the model is determined and checked."""
-        conditions = get_approach(self.equipment.name).n_conditions
-        return math.ceil(self.model.n_parameters / (1 - LEAST_REDUNDANCY) / conditions)
 
-    @property
-    def most(self) -> int:
-        """Largest number of positions that the question allows."""
-        most = self.question.most_positions
-        each = self.hold + self.equipment.moving
-        left = self.question.most_seconds - self.equipment.setup
-        return most if left >= most * each else math.floor(left / each + 1e-9)
+def least_positions(like: Candidate) -> int:
+    """Return the number of positions with which the model is determined and checked."""
+    conditions = get_approach(like.equipment.name).n_conditions
+    return math.ceil(like.model.n_parameters / (1 - LEAST_REDUNDANCY) / conditions)
 
-    def search(self, n: int) -> Search:
-        """Search for the best n positions."""
-        noise, question = Noise(), self.question
-        if self.equipment.name != "gravity":  # with a single noise the best positions are the same
-            sigma = sigma_of(question, self.equipment, n, self.hold)
-            noise = Noise(sigma, question.sigma_angle)
-        return _search(self.model.name, self.equipment.name, noise, question.tilt_range)
 
-    def best(self, n: int, starts: int = 1) -> Candidate | None:
-        """Calibration in the best n positions; None if so many are not allowed, or too few.
+def most_positions(question: Question, like: Candidate) -> int:
+    """Return the largest number of positions that a question allows for such calibrations."""
+    left = question.most_seconds - like.equipment.setup
+    each = like.hold + like.equipment.moving
+    return math.floor(min(question.most_positions, left / each + 1e-9))
 
-        Parameters
-        ----------
-        n : int
-        starts : int, random sets from which the positions are searched
-        """
-        if not self.least <= n <= self.most:
-            return None
-        search = self.search(n)
-        directions = search.optimum(n, starts).tolist()
-        content = {"title": MINIMAX, "source": "accelstudy plan", "directions": directions}
-        scheme = parse_scheme(content, f"{MINIMAX}-{n}")
-        alone = replace(self.question, holds=(self.hold,), equipment=(self.equipment,))
-        found = next(in_scheme(alone, scheme, [self.model]), None)
-        return found and replace(found, search=search, starts=starts)
 
-    def lower_bound(self, known: Candidate) -> int:
-        """Number of positions below which none reach the target.
+def lower_bound(question: Question, known: Candidate) -> int:
+    """Return the number of positions below which no calibration like one reaches the target.
 
-        By linear theory, from what a known calibration of this kind leaves, and how much its
-        positions lack of the best.
-        """
-        n = known.scheme.n_positions
-        search = self.search(n)
-        measure = self.question.accuracy(known.tilt) / known.tilt.rms.max() / self.question.target
-        variance = n * measure**2 * np.exp(search.least_value(known.scheme.directions))
-        for fewer in range(self.least, n):
-            sigma = sigma_of(self.question, self.equipment, fewer, self.hold)
-            unit = search.task.noise.sigma_force
-            if variance * (sigma / unit) ** 2 <= fewer:
-                return fewer
-        return n
+    By linear theory, from what the known one leaves, and how much its positions lack of the best.
+    """
+    n = known.scheme.n_positions
+    search = search_like(question, known, n)
+    measure = question.accuracy(known.tilt) / known.tilt.rms.max() / question.target
+    variance = n * measure**2 * np.exp(search.least_value(known.scheme.directions))
+    for fewer in range(least_positions(known), n):
+        sigma = sigma_of(question, known.equipment, fewer, known.hold)
+        unit = search.task.noise.sigma_force
+        if variance * (sigma / unit) ** 2 <= fewer:
+            return fewer
+    return n
 
-    def fewest(self, known: Candidate) -> Candidate | None:
-        """Calibration in the fewest positions that reach the target, by linear theory.
 
-        The search begins at the lower bound by a known calibration, and goes on as if each position
-        gave the same information.
-        """
-        n = self.lower_bound(known)
-        low, high = n - 1, self.most + 1
-        found: Candidate | None = None
-        while high - low > 1:
-            n = min(max(n, low + 1), high - 1)
-            if (best := self.best(n)) is None:
-                low = n
-                continue
-            low = max(low, self.lower_bound(best) - 1)
-            share = self.question.accuracy(best.tilt) / self.question.target
-            if share > 1:
-                low = max(low, n)
-            else:
-                high, found = n, best
-            n = math.ceil(n * share**2)
-        return found
+def in_fewest_positions(question: Question, known: Candidate) -> Candidate | None:
+    """Return a candidate in the fewest positions that reach the target, by linear theory.
+
+    The search begins at the lower bound by a known one, and goes on as if each position gave the
+    same information.
+    """
+    n = lower_bound(question, known)
+    low, high = n - 1, most_positions(question, known) + 1
+    found: Candidate | None = None
+    while high - low > 1:
+        n = min(max(n, low + 1), high - 1)
+        if (best := in_best_positions(question, known, n)) is None:
+            low = n
+            continue
+        low = max(low, lower_bound(question, best) - 1)
+        share = question.accuracy(best.tilt) / question.target
+        if share > 1:
+            low = max(low, n)
+        else:
+            high, found = n, best
+        n = math.ceil(n * share**2)
+    return found
 
 
 @cache
@@ -256,14 +237,11 @@ def cheapest(question: Question, compared: Iterable[Candidate]) -> Candidate | N
     for c in sort_by_time(c for c in compared if question.reached_by(c.tilt)):
         known.setdefault((c.model.name, c.hold), c)
     found = next(iter(known.values()), None)
-    bounds = []
-    for c in known.values():
-        kind = CalibrationKind.of(question, c)
-        bounds.append((c.equipment.seconds(kind.lower_bound(c), c.hold), c, kind))
-    for least, c, kind in sorted(bounds, key=lambda bound: bound[0]):
+    bounds = [(c.equipment.seconds(lower_bound(question, c), c.hold), c) for c in known.values()]
+    for least, c in sorted(bounds, key=lambda bound: bound[0]):
         assert found is not None
         if least <= found.seconds:
             no_longer = replace(question, most_seconds=found.seconds)  # else it costs more
-            fewest = replace(kind, question=no_longer).fewest(c)
+            fewest = in_fewest_positions(no_longer, c)
             found = sort_by_time(filter(None, [found, fewest]))[0]
     return found

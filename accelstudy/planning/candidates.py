@@ -67,8 +67,7 @@ class Candidate:
     sigma : float, m/s², of the mean of a position
     tilt : Tilt, that it leaves by linear theory
     redundancy : int
-    search : Search that found its positions, from so many random sets; None of a known scheme
-    starts : int
+    search : Search that found its positions; None of a known scheme
     simulated : SimulatedTilt or None
     """
 
@@ -80,7 +79,6 @@ class Candidate:
     tilt: Tilt
     redundancy: int
     search: Search | None = None
-    starts: int = 0
     simulated: SimulatedTilt | None = None
 
     @property

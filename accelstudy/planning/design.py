@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
 from contextlib import AbstractContextManager
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -50,6 +50,7 @@ def new_scheme(
     return new_file(out, inputs, force)
 
 
+@dataclass(frozen=True, eq=False, repr=False)
 class Design(Result):
     """The best positions for a calibration, in the order in which to take them.
 
@@ -57,14 +58,21 @@ class Design(Result):
     ----------
     search : accelstudy.design.search.Search
     directions : (n, 3) array of unit vectors, in the order of measurement, as in the file
-    asked : mapping, texts and numbers that were given: attitudes, after, starts
+    starts : int, random sets from which they were searched
+    after : str, scheme of positions that are measured already, or None
     """
 
     new_file, size = staticmethod(new_scheme), (FULL, 80.0)
 
-    def __init__(self, search: Search, directions: Array, asked: Mapping[str, Any]) -> None:
-        self.search, self.directions = search, directions
-        self.asked, self.name = asked, f"{len(directions)} positions"
+    search: Search
+    directions: Array
+    starts: int
+    after: str | None
+
+    @property
+    def name(self) -> str:  # type: ignore[override]
+        """How many positions there are."""
+        return f"{len(self.directions)} positions"
 
     @classmethod
     def of(cls, *, positions: int, starts: int, **keywords: Any) -> Design:
@@ -73,8 +81,7 @@ class Design(Result):
             search = search_for(**keywords)
             found = search.optimum(positions, starts)
             order = field_order(search.task, found)
-        asked = {"attitudes": keywords["attitudes"], "after": keywords["after"], "starts": starts}
-        return cls(search, found[order], asked)
+        return cls(search, found[order], starts, keywords["after"])
 
     @property
     def state(self) -> str:
@@ -106,8 +113,7 @@ class Design(Result):
     @property
     def provenance(self) -> dict[str, Any]:
         """How it was made and how good it is, as plain data in the units of files."""
-        search, asked = self.search, self.asked
-        task, noise = search.task, search.task.noise
+        search, task, noise = self.search, self.search.task, self.search.task.noise
         with units.angles_in("gon"):
             constraints = search.allowed.constraints
         content = {
@@ -121,9 +127,9 @@ class Design(Result):
             "gravity_sigma_mps2": tidy(noise.sigma_gravity, 6),
             "attitudes": search.allowed.text,
             "constraints": constraints,
-            "after": get_scheme(asked["after"]).name if asked["after"] else None,
+            "after": get_scheme(self.after).name if self.after else None,
             "seed": search.seed,
-            "starts": asked["starts"],
+            "starts": self.starts,
             "efficiency": tidy(self.efficiency, 6),
             "rms_roll_mgon": tidy(self.rms[0] / units.MGON, 6),
             "rms_pitch_mgon": tidy(self.rms[1] / units.MGON, 6),
@@ -177,7 +183,7 @@ class Design(Result):
             robot = units.to_display(task.noise.sigma_angle, "rad")
             noise += f" and robot noise {robot:.3g} {units.display_unit('rad')}"
         tilt = f"{units.to_attitude(task.tilt_range):.4g} {units.attitude_unit()}"
-        after = f" after {self.asked['after']}" if self.asked["after"] else ""
+        after = f" after {self.after}" if self.after else ""
         rms = rms_tilt(task, reference.directions)
         theirs = _both(rms) if np.isfinite(rms).all() else "do not determine the model"
         yield "\nturn: angle from the position before; 0 repeats it."

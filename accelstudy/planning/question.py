@@ -20,6 +20,8 @@ USUAL_HOLD = 10.0
 """s, for a sensor of which only the noise of a position is known."""
 HOW = {"gravity": "by hand", "robot": "with a robot"}
 """Equipment in words, by its name."""
+ESTIMATED = ("bias", "scale")
+"""Effects that every planned model estimates."""
 NONLINEAR = ("quadratic_scale", "cubic_scale")
 
 
@@ -82,23 +84,26 @@ class Question:
 
     @cached_property
     def sizes(self) -> dict[str, float]:
-        """Usual sizes, SI, of the effects that cause errors if a model lacks them.
+        """Usual sizes, SI, of the effects of the sensor, which cause errors if a model lacks them.
 
         They are the sds of the parameters over sensors: of the data sheet, else typical ones. A
         nonlinearity is divided equally into a quadratic and a cubic part. The rotation of the axes
         against the housing is left out, since it does not change the sensor's own tilt.
         """
-        shares = {"nonorthogonality": 1.0, **dict.fromkeys(NONLINEAR, math.sqrt(0.5))}
-        stated = {effect: getattr(self.sheet, effect) for effect in shares}
-        return {
-            effect: usual_size(effect) if size is None else shares[effect] * size
-            for effect, size in stated.items()
-        }
+        shares = dict.fromkeys((*ESTIMATED, "nonorthogonality"), 1.0)
+        shares |= dict.fromkeys(NONLINEAR, math.sqrt(0.5))
+        sizes = dict[str, float]()
+        for effect, share in shares.items():
+            stated = getattr(self.sheet, effect)
+            between = math.sqrt(math.prod(get_effect(effect).typical))  # good and cheap equipment
+            sizes[effect] = between if stated is None else share * stated
+        return sizes
 
     @property
     def assumed(self) -> list[str]:
-        """Effects of a usual size, as nothing is known of them."""
-        return [effect for effect in self.sizes if getattr(self.sheet, effect) is None]
+        """Effects that a model may lack, of a usual size, as nothing is known of them."""
+        unknown = [effect for effect in self.sizes if getattr(self.sheet, effect) is None]
+        return [effect for effect in unknown if effect not in ESTIMATED]
 
     @property
     def is_linear(self) -> bool:
@@ -117,9 +122,3 @@ class Question:
         if (self.confidence or 0.0) >= 0.7 and tilt.rms.max() > self.target:
             return False
         return self.accuracy(tilt) <= self.target
-
-
-def usual_size(effect: str) -> float:
-    """Size of an effect between that in good and that in cheap equipment, SI."""
-    low, high = get_effect(effect).typical
-    return math.sqrt(low * high)

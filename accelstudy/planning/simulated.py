@@ -12,7 +12,7 @@ from accelstudy.basics.units import STANDARD_GRAVITY
 from accelstudy.effects import get_effect
 from accelstudy.leveling.distribution import NOISE, Tilt
 from accelstudy.planning.candidates import Candidate
-from accelstudy.planning.question import NONLINEAR, Question, usual_size
+from accelstudy.planning.question import Question
 from accelstudy.simulation.hold_plan import HoldPlan
 from accelstudy.simulation.sessions import Noise
 from accelstudy.study.cell import Cell
@@ -24,8 +24,6 @@ SIGNS = np.array([1.0, -1.0, 1.0])
 BOTH = TILTS[-1]
 QUOTED = 0.95
 """Share of the calibrations that a plan quotes, whatever is asked for."""
-BASE_EFFECTS = ("bias", "scale", "nonorthogonality")
-"""Effects that every simulated sensor has."""
 
 
 @dataclass(frozen=True)
@@ -67,7 +65,8 @@ def simulate_candidate(
 def cell_of(question: Question, candidate: Candidate, replicates: int) -> Cell:
     """Calibrations of the usual sensor of a question, as a cell of a study."""
     equipment, scheme, model = candidate.equipment.name, candidate.scheme, candidate.model
-    sizes, truth = true_sizes(question), dict[str, float]()
+    sizes = {effect: size for effect, size in question.sizes.items() if size}
+    truth = dict[str, float]()
     for effect, size in sizes.items():
         names = [parameter.name for parameter in get_effect(effect).parameters]
         truth |= dict(zip(names, SIGNS * size, strict=True))
@@ -87,13 +86,3 @@ def cell_of(question: Question, candidate: Candidate, replicates: int) -> Cell:
         directions=tuple(map(tuple, scheme.directions.tolist())),
         max_tilt=question.tilt_range,
     )
-
-
-def true_sizes(question: Question) -> dict[str, float]:
-    """Sizes, SI, of the effects of the simulated sensor, as large as usual."""
-    sizes = {}
-    for effect in (*BASE_EFFECTS, *NONLINEAR):
-        stated: float | None = getattr(question.sheet, effect)
-        usual = usual_size(effect) if stated is None else stated
-        sizes[effect] = question.sizes.get(effect, usual)
-    return {effect: size for effect, size in sizes.items() if size}

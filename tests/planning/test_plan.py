@@ -20,7 +20,13 @@ from accelstudy.data_sheets import DataSheet, get_data_sheet, sheet_of_sigma
 from accelstudy.design.continuous import continuous_optimum
 from accelstudy.design.spaces import Attitudes
 from accelstudy.planning import candidates as known
-from accelstudy.planning.answer import CalibrationKind, answer
+from accelstudy.planning.answer import (
+    answer,
+    in_best_positions,
+    in_fewest_positions,
+    lower_bound,
+    search_like,
+)
 from accelstudy.planning.candidates import candidates, information_of, tilt_of
 from accelstudy.planning.question import Equipment, Question
 from accelstudy.planning.reasons import errors_in_use, spoilers
@@ -304,20 +310,21 @@ def test_one_position_less_does_not_suffice(plan):
     """Neither the best that are found, nor any at all: the bound is one of all choices."""
     n = plan.first.scheme.n_positions
     assert n == 18
-    kind = CalibrationKind.of(plan.question, plan.first)
-    value, error = rms(by_hand(kind.best(n - 1).scheme.directions, 30 * GON))
+    given = plan.question, plan.first
+    value, error = rms(by_hand(in_best_positions(*given, n - 1).scheme.directions, 30 * GON))
     assert value > 10 * MGON + 2 * error
-    search = kind.search(n - 1)
+    search = search_like(*given, n - 1)
     optimum = continuous_optimum(search.task, search.criterion, Attitudes(), n - 1)
     assert np.exp(optimum.bound / 2) > 10 * MGON
-    assert kind.lower_bound(kind.best(n)) in (n - 1, n)  # of the positions' own derivatives
+    # That of the positions' own derivatives.
+    assert lower_bound(plan.question, in_best_positions(*given, n)) in (n - 1, n)
 
 
 def test_the_fewest_positions_suffice_although_the_model_lacks_effects():
     bent = DataSheet("s", position_sigma=SIGMA, nonlinearity=0.001, full_scale=19.6133)
     question = asked(bent, 20 * MGON, 50 * GON, (BY_HAND,), holds=(10.0,))
-    kind = CalibrationKind(question, BY_HAND, NINE, 10.0)
-    found = kind.fewest(kind.best(20))
+    known = in_best_positions(question, _candidate(question), 20)
+    found = in_fewest_positions(question, known)
     assert np.sqrt(found.tilt.squares["quadratic_scale"].max()) > 0.2 * question.target
     assert found.tilt.rms.max() <= question.target
     assert found.scheme.n_positions < 30
@@ -327,11 +334,10 @@ def test_a_share_of_the_calibrations_is_of_both_angles_at_once():
     question = asked(target=20 * MGON, equipment=(BY_HAND,), confidence=0.95)
     found = answer(question, replicates=4000).first
     n = found.scheme.n_positions
-    kind = CalibrationKind.of(question, found)
-    inside = {
-        count: np.mean(np.all(by_hand(kind.best(count).scheme.directions, 30 * GON) < 20 * MGON, 1))
-        for count in (n, n - 2)
-    }
+    inside = {}
+    for count in (n, n - 2):
+        best = in_best_positions(question, found, count).scheme.directions
+        inside[count] = np.mean(np.all(by_hand(best, 30 * GON) < 20 * MGON, 1))
     noise = 3 * np.sqrt(0.05 * 0.95 * (1 / REPLICATES + 1 / 4000))
     assert inside[n] > 0.95 - noise
     assert inside[n - 2] < 0.95
