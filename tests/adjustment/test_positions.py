@@ -44,22 +44,6 @@ def peak(function):
     return size / 1e6
 
 
-@BOTH
-@pytest.mark.parametrize("sigma_gravity", [0.0, 1e-3])
-def test_blocks_are_those_of_the_whole_projector(approach, sigma_gravity):
-    solution = solve(NINE, approach, draw(3, noise=Noise(sigma_gravity=sigma_gravity)))
-    n, c = solution.misclosures.shape
-    a = solution.design
-    whole = np.eye(len(a)) - a @ np.linalg.solve(a.T @ a, a.T)  # as it is defined
-    for i in range(n):
-        at = slice(i * c, (i + 1) * c)
-        np.testing.assert_allclose(solution.blocks[i], whole[at, at], rtol=0, atol=1e-12)
-    gravity = 1 - np.sum(solution.basis[-1] ** 2)
-    if sigma_gravity:
-        assert gravity == pytest.approx(whole[-1, -1], abs=1e-12)
-    assert np.trace(whole) == pytest.approx(solution.redundancy, abs=1e-9)
-
-
 @pytest.mark.parametrize("sigma_gravity", [0.0, 1e-3])
 def test_variance_components_solve_their_equations_with_whole_matrices(sigma_gravity):
     """S θ = q − S₀ with W, M_i and M₀ as they are defined, at the factors that were found."""

@@ -1,7 +1,6 @@
 """Plug-ins: a file or an installed package adds to the registries; what is wrong is one line."""
 
 import importlib
-import re
 import shutil
 import sys
 from pathlib import Path
@@ -78,7 +77,7 @@ def run(cell):
     exec(cell, {"__name__": "notebook"})
 
 
-def bump(body="p[0] * f[0], 0, 0", name="Bump", parameter="a_bump"):
+def bump(body="p[0] * f[0], 0, 0", name="Bump"):
     """Code of an effect."""
     return f"""
 from accelstudy.effects.base import Effect, per_axis, register
@@ -86,22 +85,11 @@ from accelstudy.effects.base import Effect, per_axis, register
 @register
 class {name}(Effect):
     name = "bump"
-    parameters = per_axis("{parameter}", "1", "a_%", "x")
+    parameters = per_axis("a_bump", "1", "a_%", "x")
 
     def output(self, f, p, g, hold, xp):
         return {body}
 """
-
-
-@pytest.mark.parametrize(("body", "changes", "message"), [
-    ("xp.sin(p[0] * f[0]), 0, 0", {}, "sin(a_bump_x*f_x) is not linear in a_bump_x"),
-    ("p[0] * f[0], 0", {}, "output has 2 components, not 3"),
-    ("p[0] * f[0], 0, 0", {"parameter": "b"}, "b_x is a parameter of 'bias' already"),
-])  # fmt: skip
-def test_what_a_program_registers_is_checked(body, changes, message):
-    with pytest.raises(InputError, match=f"^effect 'bump': {re.escape(message)}$"):
-        run(bump(body, **changes))
-    assert "bump" not in effect_names()
 
 
 def test_a_cell_that_runs_again_replaces_what_it_registered():

@@ -158,22 +158,3 @@ def test_the_next_sensor_need_not_have_what_no_sensor_has_for_sure(tmp_path):
     sure = {name: one["in_all"] for name, one in read["parameters"].items()}
     assert sure == {name: not name.startswith("s_") for name in MODEL.parameter_names}
     assert all(one["sigma"] > 0 for one in read["parameters"].values())
-
-
-@pytest.fixture(scope="module")
-def content(tmp_path_factory):
-    """The file of a type of five sensors that are alike."""
-    rng, folder = np.random.default_rng(14), tmp_path_factory.mktemp("type")
-    made = [measured("mclaren-24", np.zeros(9), rng, f"s{i}") for i in range(5)]
-    return yaml.safe_load(type_of(made, folder).read_text(encoding="utf-8"))
-
-
-def read(content, folder, **options):
-    """What a file of a type tells that has some content."""
-    (folder / "type.yaml").write_text(yaml.safe_dump(content, **options), encoding="utf-8")
-    return read_type(folder / "type.yaml", MODEL)
-
-
-def test_the_order_of_keys_says_nothing(content, tmp_path):
-    one, other = (read(content, tmp_path, sort_keys=key).known for key in (True, False))
-    assert one == other

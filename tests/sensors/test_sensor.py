@@ -104,15 +104,3 @@ def test_an_inverse_that_does_not_exist_is_not_a_number(effect, wrong):
     result = model.correct(np.array([[G, 0.0, 0.0]]), np.array([[0.0, 0, 0], [wrong, 0, 0]]))
     np.testing.assert_allclose(result[0], [[G, 0, 0]], rtol=1e-14)
     assert np.isnan(result[1, 0, 0])
-
-
-# --- the robot's reading -------------------------------------------------------------------------
-
-
-def test_reading_errors_are_functions_of_what_is_read():
-    """r = a + k r, so r = a / (1 − k)."""
-    model = SensorModel.of("encoder", ["encoder_scale"])
-    angles = np.array([[0.3, -0.2], [3.0, 1.5], [0.0, 0.0]])
-    k = np.array([2e-3, -1e-3])
-    expected = angles / (1 - k) - angles
-    np.testing.assert_allclose(model.reading_errors(angles, k), expected, rtol=1e-12)

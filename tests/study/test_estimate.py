@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from scipy import stats
-from study_helpers import NINE, PAPER_SENSOR, grid, make_cells, plain, run_study
+from study_helpers import NINE, PAPER_SENSOR, grid, make_cells, plain
 from usual import STANDARD_ERRORS
 
 from accelstudy.study.estimate import (
@@ -198,18 +198,3 @@ def test_few_controlled_replicates_say_what_many_plain_ones_do(noise, approach, 
     for name in ("roll", "pitch", "both"):
         one, other = few.quantile(TILT, name, 0.95), many.quantile(TILT, name, 0.95)
         assert abs(one.value - other.value) < limit * np.hypot(one.error, other.error)
-
-
-def test_few_replicates_have_no_control(tmp_path):
-    """A coefficient of a handful of replicates would fit them."""
-    tables = run_study(tmp_path, grids=[grid(replicates=19)])
-    assert set(tables["cells"]["control"]) == {"none"}
-    assert (tables["summary"]["sd_gain"] == 1).all()
-    assert tables["quantiles"]["value_se"].isna().all()
-
-
-def test_a_standard_deviation_that_hardly_varies_is_its_mean(tmp_path):
-    """Linear theory has one standard deviation a priori for all replicates, up to rounding."""
-    rows = run_study(tmp_path, grids=[grid(schemes="random-38", replicates=100)])["summary"]
-    np.testing.assert_allclose(rows["sd_priori_mean"], rows["sd_linear"], rtol=1e-4)
-    assert (rows["sd_priori_gain"] == 1).all()

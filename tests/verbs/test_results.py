@@ -256,19 +256,5 @@ def test_numbers_may_be_those_of_numpy(guide):
     assert [date.year for date in acs.history(both, dates=dates).dates] == [2025, 2026]
 
 
-def test_a_campaign_in_memory_is_as_its_folder(tmp_path):
-    header = {"name": "mine", "gravity": {"value_mps2": 9.80665}, "robot": {"angle_sigma_mgon": 3}}
-    header["excluded"] = [{"position": 2, "reason": "moved"}]
-    simulated = acs.simulate_campaign()
-    campaign = acs.Campaign.of(header, forces=simulated.forces, angles=simulated.angles)
-    assert campaign.reasons == {2: "moved"}
-    acs.write_campaign(campaign, tmp_path / "mine")
-    one, other = (
-        acs.calibrate(each, model="bias-scale-nonorthogonality+base_tilt").parameters
-        for each in (campaign, tmp_path / "mine")
-    )
-    assert one.equals(other)
-
-
 def test_a_summary_has_no_empty_table(guide):
     assert guide["diagnosis"].summary().endswith(guide["diagnosis"].verdict)
