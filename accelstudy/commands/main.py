@@ -190,12 +190,12 @@ class Commands(click.Group):
 @click.group(cls=Commands, commands=[c for commands in SECTIONS.values() for c in commands])
 @click.version_option(package_name="accelstudy")
 def main() -> None:
-    """Monte Carlo study of accelerometer calibration for leveling.
+    """Calibrate tri-axial accelerometers for leveling, and study such calibrations.
 
-    Snakemake runs studies. These commands calibrate measured data, plan and judge calibrations, and
-    list what studies are made of.
+    The commands plan a calibration, calibrate measured data, and judge the result; Snakemake runs
+    studies by Monte Carlo simulation.
 
     Results go to standard output; warnings, errors and progress go to standard error. The exit
     status is 0 with any verdict, a rejected calibration included, 1 if `plan` finds nothing that
-    reaches the accuracy or the command was broken off, and 2 if an input or an option is wrong.
+    reaches the accuracy, 2 if an input or an option is wrong, and 130 after Ctrl-C.
     """

@@ -1,16 +1,16 @@
-"""The diagnosis of a campaign, stage after stage: each takes what those before it found.
+"""The diagnosis of a campaign in four stages, each of which uses the results of the earlier ones.
 
-1. Gross errors are recognised by their size, and mended (`recognise`).
-2. The base model is fitted (`fit_base`). Its residuals, and every effect, function and kind of
-   noise that the model may lack, are the `Problem` (`pose`), whose properties are computed when a
-   stage asks for them: the test for anything that is missing, the evidence for each explanation and
-   for sets of up to three effects, the posterior.
-3. The evidence is judged by rules, of which the first that matches decides (`decide`).
-4. The effect is chosen and fitted again on a part of the positions, and the others confirm it, or
-   do not (`confirm`).
+1. `recognise`: gross errors are recognised by their size, and corrected.
+2. `fit_base` fits the base model. `pose` makes a `Problem` of its residuals and of every effect,
+   function and kind of noise that the model may lack. Its properties are computed on demand: the
+   test whether anything is missing, the evidence for each explanation and for sets of up to three
+   effects, the posterior.
+3. `decide`: rules judge the evidence, and the first rule that matches gives the finding.
+4. `confirm`: the effect is chosen and fitted again without a part of the positions, and its
+   prediction of these held-out positions confirms it or does not.
 
-Where the disagreement lives, what it is worth, and where to measure next, a `CampaignDiagnosis`
-computes when it is asked.
+The `CampaignDiagnosis` computes on demand where the misfit is, what it means for the tilt error,
+and where to measure next.
 """
 
 from __future__ import annotations
@@ -34,14 +34,14 @@ def diagnose(
     approach: Approach | None = None,
     seed: int = 1,
 ) -> CampaignDiagnosis:
-    """Find whether, where and why a campaign disagrees with a sensor model.
+    """Diagnose whether, where and why a campaign contradicts a sensor model.
 
     Parameters
     ----------
     campaign : Campaign
-    model : SensorModel, in which something may be missing
+    model : SensorModel, which may lack an effect
     approach : Approach; by default robot-aided if the campaign has the robot's angles
-    seed : int, of all that is simulated or drawn
+    seed : int, of all random numbers
 
     Raises
     ------
@@ -52,7 +52,7 @@ def diagnose(
     recognised = recognise(campaign, approach.uses_angles)
     if recognised is not None:
         campaign = recognised.corrected
-    # A stream for each, so that none changes what another one draws.
+    # A random stream for each stage that draws, so that none changes the numbers of the other.
     null, split = (np.random.SeedSequence(seed, spawn_key=(key,)) for key in (0, 1))
     problem = pose(fit_base(campaign, model, approach), null)
     finding = decide(problem, campaign)

@@ -30,7 +30,7 @@ def calibrate(
 
     The folder of results gets report.html for you, calibration.json for `apply`, `export` and
     programs, positions.parquet and figures. Parameters are in the axes frd (forward, right, down),
-    whatever those of the log are.
+    whatever the axes of the log are.
 
     Parameters
     ----------
@@ -85,13 +85,14 @@ def check_sigmas(
 ) -> pd.DataFrame:
     """Check the sigmas of a calibration by simulation.
 
-    The campaign is simulated with the noise that its sigmas are from. So the check finds whether
-    the adjustment turns that noise into the right sigmas, and not whether the noise is right.
+    The campaign is simulated with the noise from which its sigmas were computed. So the check finds
+    whether the adjustment turns that noise into the right sigmas, and not whether the noise is
+    right.
 
     Parameters
     ----------
     campaign : Campaign or path
-        Folder of the campaign that is calibrated.
+        Folder of the campaign.
     replicates : int
         Simulated campaigns.
 
@@ -135,15 +136,16 @@ def apply(
     """Apply a calibration to a log and level with it.
 
     The log is read as that of the campaign was; `columns` and the like say what is different. The
-    output has its columns, and beside them the calibrated force, roll and pitch with their sigmas,
-    in the axes of the log. A row that cannot be corrected stays empty. Where the x axis is so near
-    the vertical that the sigmas of roll and pitch do not hold, near_pole is true.
+    output has the columns of the log, and beside them the calibrated force, roll and pitch with
+    their sigmas, in the axes of the log. The new cells of a row that cannot be corrected stay
+    empty. Where the x axis is so near the vertical that the sigmas of roll and pitch do not hold,
+    near_pole is true.
 
     Some effects depend on the time since the calibration session began. The first row is taken for
     that moment. This is right for the log of the session itself, and for a warm-up if the log
     begins when the sensor is switched on. For a log that begins later give `start`. A drift is
-    known in its session only; later rows are corrected by what it was at the end. Hysteresis and
-    settling depend on the position before, which a log does not tell; they are not corrected.
+    known in its session only; later rows are corrected by the drift at its end. Hysteresis and
+    settling depend on the previous position, which a log does not contain; they are not corrected.
 
     Parameters
     ----------
@@ -195,13 +197,15 @@ def export(calibration: Calibration | str | PathLike[str], *, form: str = "c") -
     """Print a calibration in a form that a device takes.
 
     c is a header in C99 with the function accel_calibrate. It takes the reading and, where effects
-    depend on them, temperature, time and vibration. What depends on the position before is refused.
+    depend on them, temperature, time and vibration. A model with an effect that depends on the
+    previous position is refused.
 
-    matrix holds M in force = M · (x, y, z, 1), if nothing but the force matters, and that linearly.
+    matrix is M in force = M · (x, y, z, 1), for a model that depends on the force alone, and
+    linearly.
 
     px4 is a parameter file for PX4: an offset, a scale and a polynomial of the temperature for each
-    axis, closest to the calibration over all attitudes. What PX4 cannot hold is said, with the
-    errors of roll and pitch that it leaves.
+    axis, closest to the calibration over all attitudes. A warning says what PX4 cannot express, and
+    the errors of roll and pitch that this leaves.
 
     Readings and forces are in the axes of the log.
 
@@ -241,8 +245,8 @@ def diagnose(
 ) -> Diagnosis:
     """Find what a sensor model lacks to explain a campaign.
 
-    Missing effects, wrong noise and gross errors are told apart. What is missing is added to the
-    model, and tested on positions that were not used.
+    Missing effects, wrong noise and gross errors are distinguished. What is missing is added to the
+    model, and tested on positions that were not used to find it.
 
     Parameters
     ----------

@@ -98,11 +98,11 @@ def find_holds(
 ) -> Campaign:
     """Make a campaign of a raw log: find its static holds.
 
-    The noise of the log itself tells what is at rest, unless `threshold` does.
+    The sensor is at rest where the sd of the readings is near the noise floor of the log, or below
+    `threshold`.
 
     With `reference_log` and `reference` a calibrated sensor on the same plate takes the place of a
-    robot: it tells roll and pitch of each hold. Its times are of the same clock as those of the
-    log.
+    robot: it gives roll and pitch of each hold. The times of both logs must be of the same clock.
 
     The command draws segmentation.png, which shows the holds with their numbers.
 
@@ -122,7 +122,7 @@ def find_holds(
     shortest : float in s, or str with a unit
         Shortest hold, s, without its ends. [default: 1]
     exclude : str, or several
-        What to leave out, and why: 13:moved or 13,14:moved.
+        Holds to leave out, and why: 13:moved or 13,14:moved.
     block : int
         Samples of each position, in a log without the moves between them.
     means : bool
@@ -132,24 +132,25 @@ def find_holds(
     robot_unit : str
         Unit of the robot's angles: gon, deg, rad. [default: gon]
     reference_log : path
-        Raw log of a calibrated sensor on one plate with it.
+        Raw log of a calibrated sensor on the same plate.
     reference : path
         The calibration.json of that sensor.
     reference_columns : mapping or str
-        Its columns: fx=a,fy=b,fz=c,time=t. [default: as in the log of its calibration]
+        Columns of that log: fx=a,fy=b,fz=c,time=t. [default: as in the log of its calibration]
     reference_offset : float in s, or str with a unit
-        Seconds to add to its times. [default: 0; without times both logs begin together]
+        Seconds to add to the times of that log. [default: 0; without times both logs begin
+        together]
     name : str
         Name of the campaign. [default: that of the file]
     gravity : float in m/s², or str with a unit
         Local gravity, m/s². [default: 9.80665]
     settings : path
-        YAML file with settings; options go before it.
+        YAML file with settings; options take precedence.
 
     Returns
     -------
     Campaign
-        What was found and assumed stands in `notes`, what its user should know in `warnings`.
+        `notes` says what was found and assumed, `warnings` what may be wrong.
 
     Raises
     ------
@@ -260,9 +261,9 @@ def simulate_campaign(
 ) -> Campaign:
     """Simulate a campaign with effects of your choice.
 
-    It can have noise effects, too; `accelstudy effects` lists them. What is not given is drawn at
-    random, from the seed. The truth is `truth` of the campaign; the command writes it to --truth
-    and nowhere else.
+    Noise effects are possible, too; `accelstudy effects` lists both. Parameters that are not given
+    are drawn at random, from the seed. The truth is `truth` of the campaign; the command writes it
+    to --truth and nowhere else.
 
     Parameters
     ----------
@@ -278,7 +279,7 @@ def simulate_campaign(
         Order of the holds: scheme or random.
     effects : str, or several
         An effect beside the model, as 'warm_up(tau=400)' or, with its parameters in SI,
-        'thermal_bias: 0.004, -0.002, 0.001'; one of an effect of the model replaces it.
+        'thermal_bias: 0.004, -0.002, 0.001'; an effect that the model has is replaced.
     size : float
         Factor of the typical size of each effect of `effects` without parameters.
     noise_effects : str, or several
@@ -302,7 +303,7 @@ def simulate_campaign(
     yaw : str
         Yaw of the holds: none or random.
     n_samples : int
-        Samples of a hold; adds columns on them.
+        Samples of a hold; adds the columns of their number and their sds.
 
     Returns
     -------

@@ -218,7 +218,7 @@ ModelName = Annotated[
 TypeFile = Annotated[
     str | PathLike[str] | None,
     PATH,
-    "The type.yaml of a lot: how its sensors scatter, as what is known of this one.",
+    "The type.yaml of a lot: how its sensors scatter, as prior knowledge of this one.",
 ]
 CampaignOrPath = Annotated[
     "Campaign | str | PathLike[str]", Kind(lambda name, value: value, "path", files=True)
@@ -241,7 +241,7 @@ TimeUnit = Annotated[
 Rate = Annotated[
     Quantity | None,
     si("Hz", bounds.RATE.least, bounds.RATE.most),
-    "Samples per second, where there is no time.",
+    "Samples per second, for a log without times.",
 ]
 Variable = Annotated[
     str | None, TEXT, "Array of a MATLAB file, topic of a bag or instance of a ULog."

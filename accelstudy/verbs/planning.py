@@ -125,9 +125,9 @@ def find_positions(
 ) -> Design:
     """Find the best positions for a calibration.
 
-    The YAML file that comes out is a scheme: configurations and commands take its path wherever
-    they take the name of a scheme. The positions are in an order that makes the ways between them
-    short, with the last one near the first.
+    The result is a scheme, a YAML file: configurations and commands take its path wherever they
+    take the name of a scheme. The order of the positions keeps the turns between them small, with
+    the last position near the first.
 
     Parameters
     ----------
@@ -147,8 +147,8 @@ def find_positions(
     after : str
         Scheme that has been measured already.
     attitudes : str
-        Those to choose from: all; cube: on faces, edges and corners; hand: in steps of 30° that an
-        eye can judge; or a scheme, as a file of those that are allowed.
+        Attitudes to choose from: all; cube: on faces, edges and corners; hand: in steps of 30° that
+        an eye can judge; or a scheme, such as a file of those that are allowed.
     roll : two of float in rad, or str with a unit
         Least and largest roll.
     pitch : two of float in rad, or str with a unit
@@ -192,17 +192,18 @@ def advise(
 ) -> Advice:
     """Say in a session where to go next, and when to stop.
 
-    The positions so far are calibrated and judged as `calibrate` does. The advice says what is not
-    determined yet, which positions contradict the others, and the tilt accuracy so far.
+    The positions so far are calibrated and judged as `calibrate` does. The advice says which
+    parameters are not determined yet, which positions contradict the others, and the tilt error so
+    far.
 
-    The accuracy is the rms over all calibrations that could have come out. If the noise is known,
-    about half of single ones leave more in roll or in pitch.
+    The tilt error is an rms over all calibrations that the noise could have given. If the noise is
+    known, about half of them leave more than this in roll or in pitch.
 
     Parameters
     ----------
     campaign : Campaign or path
-        Folder of the session. It has a campaign.yaml; its positions.csv may have few positions or
-        none, or be missing still.
+        Folder of the session. It has a campaign.yaml; positions.csv may have few positions or none,
+        or not exist yet.
     tilt_accuracy : float in rad, or str with a unit
         Rms of roll and of pitch to reach, as 10mgon or 0.01deg.
     tilt_range : float in rad, or str with a unit
@@ -296,7 +297,7 @@ def data_sheet(
     """Make a data sheet of a sensor from a log or a campaign.
 
     White noise, bias instability and random walk come from the Allan deviation of the log; of a
-    campaign only the noise of its positions is known. What the maker says can be added to the file,
+    campaign only the noise of its positions is known. You can add values of the maker to the file,
     which `accelstudy plan --sensor` takes.
 
     Parameters

@@ -24,12 +24,12 @@ def compare(
     *,
     tilt_range: kinds.Tilt = kinds.TILT_RANGE,
 ) -> History:
-    """Say whether a sensor is still what it was.
+    """Test whether a sensor changed between two calibrations.
 
     The congruence test of deformation analysis takes all parameters with both covariance matrices;
-    if it rejects, the parameters that changed are named, at one level for all. The change is also
-    given in roll and pitch. Both calibrations have to be of one model. If both campaigns have a
-    date, the older one comes first.
+    if it rejects, the parameters that changed are named, with one level for all tests together. The
+    change is also given in roll and pitch. Both calibrations have to be of one model. If both
+    campaigns have a date, the older one comes first.
 
     The folder of results gets report.html, history.json and a figure.
 
@@ -74,10 +74,11 @@ def history(
 
     The congruence test says what changed. For each parameter there is a rate with its interval, and
     the scatter from session to session, as by switching the sensor off and on. All tests together
-    have one level. All calibrations have to be of one model; of two, it says what `compare` does.
+    have one level. All calibrations have to be of one model; of two, the result is that of
+    `compare`.
 
-    With `tilt_accuracy` it says how long the last calibration is good enough, and what a new one
-    would gain.
+    With `tilt_accuracy` the result says how long the last calibration is good enough, and what a
+    new one would gain.
 
     The folder of results gets report.html, history.json and a figure.
 
@@ -129,9 +130,9 @@ def lot(
 ) -> Lot:
     """Say what the model of sensors of one type lacks.
 
-    The campaigns may differ in positions, columns and approach. What one campaign alone cannot
-    show, many show together: whether anything is missing in the lot, at one level for all, in how
-    many of the sensors, how large it is, and which sensor is odd.
+    The campaigns may differ in positions, columns and approach. Effects that are too small for one
+    campaign show in many: the lot says whether anything is missing, with one level for all tests
+    together, in how many of the sensors, how large it is, and which sensors are odd.
 
     The folder of results gets report.html, lot.json, a figure, a calibration.json of each sensor
     with all that the model lacks, and type.yaml: the model of the type for `--model`, what these
@@ -142,7 +143,7 @@ def lot(
     campaigns : sequence of Campaign or path
         Folders of campaigns, one per sensor, or patterns such as 'sensor-*'.
     cores : int
-        Processes that work at once; the results do not depend on it.
+        Processes that work at once; the results do not depend on their number.
 
     Raises
     ------
@@ -169,7 +170,7 @@ def batch(
 ) -> Batch:
     """Calibrate many campaigns, each by itself.
 
-    What cannot be calibrated is named, and stops no other.
+    A campaign that cannot be calibrated is named, and the others go on.
 
     The folder of results gets report.html with an overview, a table of the campaigns and one of
     their parameters, and in each/NAME what `accelstudy calibrate` writes of a campaign.

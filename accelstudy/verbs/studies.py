@@ -55,8 +55,8 @@ def list_effects(
     """List all effects, or what a campaign can show of them.
 
     Models are composed of effects. Parameters are in the units shown, settings in SI. With
-    `campaign` or `scheme` the command tells which effects can show beside the model, how large they
-    must be to be detected and to be named, and with what they would be confused.
+    `campaign` or `scheme` the command says which effects can show beside the model, how large they
+    must be to be detected and to be named, and with which others they would be confused.
 
     Parameters
     ----------
