@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
-from itertools import permutations, product
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -23,7 +22,7 @@ from accelstudy.campaign.importing.windows import windows_at_rest
 from accelstudy.campaign.reference import ReferenceSensor
 from accelstudy.leveling.angles import angles_of, near_pole
 from accelstudy.pages import render_lines
-from accelstudy.sensors.frames import Frame
+from accelstudy.sensors.frames import WAYS, Frame
 
 if TYPE_CHECKING:
     from accelstudy.campaign.calibration.sensor_calibration import SensorCalibration
@@ -40,12 +39,6 @@ MIN_MISFIT = 0.03
 """Misfit of the turns of both sensors, in parts of gravity, that no pair on one plate has."""
 MAX_ROTATION = 20 * GON
 """Rotation between the sensors, beside quarter turns, up to which it is small."""
-QUARTER_TURNS = tuple(
-    frame
-    for letters in permutations(("fb", "rl", "du"))
-    for name in product(*letters)
-    if (frame := Frame("".join(name))) and np.linalg.det(frame.matrix) > 0
-)
 MIN_HOLDS = 8
 """Holds from which on it is checked that both sensors turn together."""
 
@@ -228,16 +221,17 @@ class ReferenceLog:
                 )
         left_side, _, right_side = np.linalg.svd(forces.T @ own)
         turn = left_side @ np.diag([1, 1, np.linalg.det(left_side @ right_side)]) @ right_side
-        traces = {frame: np.trace(frame.matrix.T @ turn) for frame in QUARTER_TURNS}
-        best = max(traces, key=lambda frame: traces[frame])
-        rest = float(np.arccos(np.clip((traces[best] - 1) / 2, -1, 1)))
+        # Where each axis of the reference points, nearly; what is left has this trace.
+        along, ways = np.abs(turn).argmax(axis=0), np.array([*WAYS]).reshape(3, 2)
+        cosines = turn[along, range(3)]
+        rest = float(np.arccos(np.clip((np.abs(cosines).sum() - 1) / 2, -1, 1)))
         if rest > MAX_ROTATION:
             raise InputError(
                 f"{where}: besides quarter turns, the reference is turned by {rest / GON:.0f} gon "
                 f"against the sensor; mount it within {MAX_ROTATION / GON:.0f} gon, as only a "
                 "small rotation is estimated"
             )
-        return best
+        return Frame("".join(ways[along, np.where(cosines < 0, 1, 0)]))
 
 
 def usable_reference(path: Path) -> SensorCalibration:

@@ -168,14 +168,12 @@ def _runs_at_rest(
         return runs, []
     lost = (settings.window or usual_window(log)) + 2 * settings.trim
     spans = (np.sort(short)[[0, -1]] + 2 * cut + windows.width) * step
-    left = (spans[0] - lost) * (1 + 1e-9)
-    digit = 10.0 ** np.floor(np.log10(left))
     said = " to ".join(dict.fromkeys(f"{span:.1f}" for span in spans))
     are, them = ("are", "them") if len(short) > 1 else ("is", "it")
     return runs, [
         f"{plural(len(short), 'rest')} of {said} s {are} no hold: it takes {lost + shortest:.3g} s,"
         f" of which {lost:.3g} s at its ends do not count; `shortest` "
-        f"{digit * np.floor(left / digit):g} (now {shortest:g}) takes {them}"
+        f"{step * short.min():.4g} (now {shortest:g}) takes {them}"
     ]
 
 

@@ -118,7 +118,7 @@ class Log:
     @cached_property
     def forces(self) -> Array:
         """Forces of the samples, (n, 3), m/s²; each axis in one piece."""
-        return forces_of(self.samples)
+        return self.samples.iloc[:, 1:4].to_numpy()
 
     def column(self, key: str) -> Array:
         """Numbers of the column of a key as they are in the file, (n,); NaN where there is none."""
@@ -398,18 +398,13 @@ def join(logs: Sequence[Log]) -> Log:
             samples[i] = samples[i].assign(time=samples[i]["time"] + shift)
         end = samples[i]["time"].iloc[-1] + joined.step
     # In a single position, a channel of a coarse sensor may be constant.
-    constant = [bool((force == force[0]).all()) for force in forces_of(samples[0]).T]
-    if len(logs) == 1 and any(constant):
-        axis = AXES[min(first.layout.axes.order[np.array(constant)])]
+    constant = np.ptp(samples[0].iloc[:, 1:4].to_numpy(), axis=0) == 0
+    if len(logs) == 1 and constant.any():
+        axis = AXES[min(first.layout.axes.order[constant])]
         name = first.raw.names[first.places[axis]]
         raise InputError(f"{first.path}: column {name} ({axis}) is constant")
     whole = pd.concat(samples, join="inner") if samples[1:] else samples[0]
     return replace(joined, samples=whole)
-
-
-def forces_of(samples: pd.DataFrame) -> Array:
-    """Forces (n, 3), m/s², of samples, without a copy."""
-    return samples.iloc[:, 1:4].to_numpy()
 
 
 def _counted_from_first(values: NDArray[Any]) -> tuple[Array, float]:

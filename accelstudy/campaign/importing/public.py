@@ -44,14 +44,10 @@ class PublicData(ConfigSection):
         return Path(unquote(urlsplit(self.url).path)).name
 
 
-class _Registry(ConfigSection):
-    sets: dict[str, PublicData]
-
-
 @cache
 def public_data() -> Mapping[str, PublicData]:
     """Public files by name."""
-    return validate(_Registry, {"sets": read_layer(REGISTRY)}, REGISTRY).sets
+    return {name: validate(PublicData, one, name) for name, one in read_layer(REGISTRY).items()}
 
 
 def import_settings(name: str) -> ImportSettings:

@@ -156,7 +156,6 @@ class _Rows:
         self.names: list[str] | None = None
         self.notes: list[str] = []
         units: list[str] = []
-        unfit: list[str] = []
         for number, line in reversed([*enumerate(lines[: self.first], 1)]):
             text = line.strip(self._around).lstrip("".join(self._comments)).strip(self._around)
             if not text.strip(f" \t-=+|_{self.delimiter or ''}"):  # a rule, or nothing
@@ -170,15 +169,9 @@ class _Rows:
                 self.header += (line.strip(),)
                 self.notes += [f"units: in line {number + 1}, below the names"] if units else []
                 break
-            if len(cells) > 2:
-                unfit.append(
-                    f"line {number} has {len(cells)} names for {self.width} columns, so these "
-                    "have numbers, from 0"
-                )
             if not line.lstrip().startswith(self._comments):
                 break
         if self.names is None:
-            self.notes += unfit[:1]
             self._take_names(units, [])
         # What Arrow takes for something else.
         comment = next((c for c in "#%" for line in lines if line.lstrip()[:1] == c), "#")
@@ -193,7 +186,6 @@ class _Rows:
             names = names[:-1]
         empty = all(row[len(names) :][:1] == [""] for row in self._sample)
         if len(names) == self.width - 1 and empty:
-            self.notes.append("a delimiter at the end of each row is no column")
             self.width = len(names)
         if self.width < len(names) == longest:
             self.width = len(names)
