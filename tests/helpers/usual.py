@@ -5,6 +5,7 @@ import pytest
 
 from accelstudy.approaches import get_approach
 from accelstudy.basics.units import MGON, STANDARD_GRAVITY
+from accelstudy.planning import candidates
 from accelstudy.sensors.models import get_model
 
 G = STANDARD_GRAVITY
@@ -18,8 +19,16 @@ PAPER_TRUTH = {
 PAPER = NINE.vector(PAPER_TRUTH)
 GRAVITY, ROBOT = get_approach("gravity"), get_approach("robot")
 BOTH = pytest.mark.parametrize("approach", [GRAVITY, ROBOT], ids=lambda approach: approach.name)
+FEW_SIZES = (9, 12, 20, 30, 40, 80, 120)
+FEW_MODELS = ("bias-scale", NINE.name, f"{NINE.name}-quadratic-cubic")
 STANDARD_ERRORS = 4.5
 """Within which simulated numbers are to lie."""
+
+
+def compare_few(patch):
+    """Let plans compare schemes of a few sizes and a few models, among which the best ones are."""
+    patch.setattr(candidates, "SIZES", FEW_SIZES)
+    patch.setattr(candidates, "PLANNED_MODELS", FEW_MODELS)
 
 
 def share_tolerance(share, n):

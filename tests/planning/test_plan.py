@@ -13,13 +13,12 @@ from calling import call, succeed
 from closed_forms import roll_and_pitch
 from golden import compare
 from places import ROOT
-from usual import NINE, G
+from usual import NINE, G, compare_few
 
 from accelstudy.basics.units import GON, MGON
 from accelstudy.data_sheets import DataSheet, get_data_sheet, sheet_of_sigma
 from accelstudy.design.continuous import continuous_optimum
 from accelstudy.design.spaces import Attitudes
-from accelstudy.planning import candidates as known
 from accelstudy.planning.answer import (
     answer,
     in_best_positions,
@@ -38,8 +37,6 @@ from accelstudy.study.statistics import TILT, simulated_statistics
 
 MCLAREN = get_scheme("mclaren-24")
 HAS = ("bias", "scale", "nonorthogonality", "quadratic_scale")
-SIZES = (9, 12, 20, 30, 40, 80, 120)
-MODELS = ("bias-scale", NINE.name, f"{NINE.name}-quadratic-cubic")
 QUESTION = "plan --tilt-accuracy 10mgon --tilt-range 30gon --sigma 2mm/s2"
 SIGMA = 0.002
 REPLICATES = 5000
@@ -48,8 +45,7 @@ REPLICATES = 5000
 @pytest.fixture(autouse=True)
 def few_candidates(monkeypatch):
     """Schemes of a few sizes and a few models are enough, but for the plan of the README."""
-    monkeypatch.setattr(known, "SIZES", SIZES)
-    monkeypatch.setattr(known, "PLANNED_MODELS", MODELS)
+    compare_few(monkeypatch)
 
 
 @pytest.fixture(scope="module")

@@ -4,6 +4,7 @@ import matplotlib
 import numpy as np
 import pytest
 from places import ROOT
+from usual import compare_few
 
 matplotlib.use("agg")
 NOTEBOOKS = sorted((ROOT / "docs/notebooks").glob("*.py"))
@@ -15,6 +16,7 @@ def ran(tmp_path_factory):
     found = {}
     with pytest.MonkeyPatch.context() as patch:
         patch.chdir(tmp_path_factory.mktemp("notebooks"))
+        compare_few(patch)
         for path in NOTEBOOKS:
             found[path.stem] = {}
             exec(compile(path.read_text(encoding="utf-8"), path, "exec"), found[path.stem])

@@ -16,6 +16,7 @@ from matplotlib import pyplot
 from matplotlib.figure import Figure
 from places import ROOT
 from scipy import stats
+from usual import compare_few
 
 import accelstudy as acs
 from accelstudy.drawing.style import in_style
@@ -43,6 +44,7 @@ def guide(tmp_path_factory):
     names = {}
     with pytest.MonkeyPatch.context() as patch:
         patch.chdir(folder)
+        compare_few(patch)
         exec(compile(source, "python_example.py", "exec"), names)
     return {**names, "folder": folder}
 
