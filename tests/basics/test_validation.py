@@ -34,16 +34,23 @@ MARKS = (
 
 
 def test_all_errors_are_in_plain_words():
-    """Of each key of each model alone, as a message is of the first one that is wrong."""
+    """Of each key of each model alone, as a message is of the first one that is wrong.
+
+    It begins with the key, or says which keys there are.
+    """
     assert len(models()) > 30
     said = set()
     for model in models():
         for name, field in model.model_fields.items():
+            key = field.alias or name
             alone = create_model(name, __base__=ConfigSection, **{name: (field.annotation, field)})
-            for content in ({}, 3, *({field.alias or name: value} for value in WRONG)):
+            for content in ({}, 3, *({key: value} for value in WRONG)):
                 try:
                     validate(alone, content, "file")
                 except InputError as error:
-                    said.add(re.sub(r"[‘'\"].*?[’'\"]|\(known: .*", "", str(error)))
-    assert len(said) > 1500
-    assert [text for text in said if re.search(MARKS, text)] == []
+                    said.add((f"file: {key}", str(error)))
+    begins = [text.startswith((key, "file: expected keys")) for key, text in said]
+    plain = {re.sub(r"[‘'\"].*?[’'\"]|\(known: .*", "", text) for _, text in said}
+    assert all(begins)
+    assert len(plain) > 1500
+    assert [text for text in plain if re.search(MARKS, text)] == []

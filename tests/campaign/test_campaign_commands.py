@@ -9,6 +9,7 @@ from page_helpers import assert_sound, text_of
 from usual import NINE
 
 import accelstudy as acs
+from accelstudy.schemes import get_scheme
 
 TRUTH = {"b_x": 0.05, "b_y": 0.01, "b_z": 0.03, "s_x": 2e-4, "alpha_zx": 7e-4}
 
@@ -58,10 +59,7 @@ def test_what_cannot_be_a_sensor_is_said():
     So no residual tells; import, calibrate and diagnose say it. A sensor of any data sheet passes
     without a word.
     """
-    i = np.arange(20) + 0.5
-    z, azimuth = 1 - i / 10, i * np.pi * (1 + np.sqrt(5))
-    level = np.sqrt(1 - z**2)
-    f_b = np.column_stack([level * np.cos(azimuth), level * np.sin(azimuth), z])
+    f_b = -get_scheme("fibonacci-20").directions
     noise = 3e-4 * np.random.default_rng(2).standard_normal(f_b.shape)
     for offset, factor, said in ((0.0, 0.51, "s_x"), (0.48, 1.0, "b_x"), (0.2, 1.1, None)):
         log = table(np.round(16384 * (f_b + noise + [offset, 0, 0])))

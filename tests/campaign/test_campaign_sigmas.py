@@ -13,6 +13,7 @@ from accelstudy.adjustment import Observations, calibrate
 from accelstudy.campaign.calibration.fit import fit_campaign
 from accelstudy.campaign.calibration.sigma_check import check_sigmas
 from accelstudy.campaign.calibration.wording import sentences
+from accelstudy.schemes import get_scheme
 from accelstudy.simulation.sessions import Noise
 
 G, SIGMA, SESSIONS = 9.81, 0.002, 4000
@@ -22,13 +23,9 @@ ERROR = math.sqrt(0.05 * 0.95 / SESSIONS)
 
 
 def sessions():
-    """Readings (R, 24, 3) of a sensor with biases and scales, in positions of its own."""
-    rng = np.random.default_rng(12)
-    i = np.arange(24) + 0.5
-    z, azimuth = 1 - i / 12, i * math.pi * (1 + math.sqrt(5))
-    level = np.sqrt(1 - z**2)
-    f_b = G * np.stack([level * np.cos(azimuth), level * np.sin(azimuth), z], axis=1)
-    noise = rng.standard_normal((SESSIONS, 24, 3))
+    """Readings (R, 24, 3) of a sensor with biases and scales."""
+    f_b = -G * get_scheme("fibonacci-24").directions
+    noise = np.random.default_rng(12).standard_normal((SESSIONS, 24, 3))
     return (1 + SCALE) * f_b + BIAS + SIGMA * noise
 
 

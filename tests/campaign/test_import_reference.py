@@ -6,6 +6,7 @@ import pytest
 from calling import refused
 
 import accelstudy as acs
+from accelstudy.schemes import get_scheme
 
 G, RATE, HOLD = 9.80665, 25.0, 4.0
 QUARTER = np.array([[0.0, 1, 0], [-1, 0, 0], [0, 0, 1]])  # x of the reference points right
@@ -16,10 +17,7 @@ OF_SENSOR = np.array([[0.99, 0.012, 0.007], [-0.004, 1.005, 0.009], [0.011, -0.0
 
 def turned(count, rng):
     """Forces of a plate that is held in evenly spread attitudes, and moved between them."""
-    i = np.arange(count) + 0.5
-    z, turn = 1 - 2 * i / count, np.pi * (1 + 5**0.5) * i
-    r = np.sqrt(1 - z * z)
-    held = np.column_stack([r * np.cos(turn), r * np.sin(turn), z])
+    held = get_scheme(f"fibonacci-{count}").directions
     share = np.linspace(0, 1, int(2 * RATE))[:, None]
     parts = []
     for first, then in zip(held, np.roll(held, -1, axis=0), strict=True):

@@ -11,17 +11,14 @@ from accelstudy.diagnosis.pipeline import diagnose
 from accelstudy.diagnosis.report.figures import AXES, shape_figure
 from accelstudy.diagnosis.report.words import verdict_lines
 from accelstudy.effects import get_effect
+from accelstudy.schemes import get_scheme
 
 SIGMA, N = 2e-3, 40
 
 
 def plain_campaign(rng):
-    """A session of a robot and an ideal sensor, by NumPy alone."""
-    golden = np.pi * (3 - np.sqrt(5)) * np.arange(N)
-    z = 1 - (2 * np.arange(N) + 1) / N
-    directions = np.column_stack([np.sqrt(1 - z**2) * np.cos(golden),
-                                  np.sqrt(1 - z**2) * np.sin(golden), z])  # fmt: skip
-    f = -G * rng.permutation(directions)
+    """A session of a robot and an ideal sensor."""
+    f = -G * rng.permutation(get_scheme(f"fibonacci-{N}").directions)
     sigma_angle = 10 * MGON
     return made(
         f + SIGMA * rng.standard_normal((N, 3)),

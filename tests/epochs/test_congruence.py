@@ -6,6 +6,7 @@ from usual import share_tolerance
 
 from accelstudy.adjustment.quality import POWER
 from accelstudy.epochs.congruence import LEVEL, Congruence, dof_of_squares
+from accelstudy.schemes import get_scheme
 
 N = 1000
 P = 9
@@ -37,9 +38,7 @@ def design(n, each):
 
     With `each` axis by itself, as beside a robot, or by the norm of the force, as by gravity.
     """
-    k = np.arange(n) + 0.5
-    z, azimuth = 1 - 2 * k / n, np.pi * (1 + np.sqrt(5)) * k
-    f = 9.81 * np.column_stack([*(np.sqrt(1 - z**2) * [np.cos(azimuth), np.sin(azimuth)]), z])
+    f = -9.81 * get_scheme(f"fibonacci-{n}").directions
     axes = np.zeros((n, 3, P))
     axes[:, :, :3], axes[:, [0, 1, 2], [3, 4, 5]] = np.eye(3), f
     axes[:, 0, 6], axes[:, 0, 7], axes[:, 1, 8] = f[:, 1], f[:, 2], f[:, 2]

@@ -1,7 +1,6 @@
 """Configurations: those of the repository are valid, and bad ones end with one clear line."""
 
 import json
-import math
 
 import pytest
 import yaml
@@ -136,56 +135,3 @@ def test_numbers_as_yaml_1_1_reads_them():
 def test_the_hash_of_a_configuration_is_that_of_what_numbers_depend_on():
     assert config_hash(content(angle_unit="deg")) == config_hash(content())
     assert config_hash(content(seed=2)) != config_hash(content())
-
-
-# --- anything at all -----------------------------------------------------------------------------
-
-WHOLE = {
-    **read_layer(CONFIG),
-    "models": {"mine": ["bias"]},
-    "grids": [grid(approaches=["robot", "gravity"], sensor_sigma_mps2=[0.002]), grid("mine")],
-}
-"""A valid configuration with every block, and few cells."""
-NONSENSE = ("no such thing", {"x": 1}, [[]], math.nan)
-"""What no key may have."""
-
-
-def leaves(place, path=()):
-    """Paths of all values that are neither mappings nor lists of mappings."""
-    if isinstance(place, dict):
-        return [leaf for key, value in place.items() for leaf in leaves(value, (*path, key))]
-    if isinstance(place, list) and place and isinstance(place[0], dict):
-        return [leaf for i, value in enumerate(place) for leaf in leaves(value, (*path, i))]
-    return [path]
-
-
-def spoilt(value, path, junk):
-    """A copy of a configuration with something else at a path."""
-    if not path:
-        return junk
-    copy = value.copy()
-    copy[path[0]] = spoilt(value[path[0]], path[1:], junk)
-    return copy
-
-
-def accept_or_refuse(given_content):
-    """Either a study with cells or a message of one line, which is returned."""
-    try:
-        study = parse_study(given_content)
-    except InputError as error:
-        message = str(error)
-        assert message.startswith("config: ")
-        assert len(message.splitlines()) == 1
-        return message
-    assert study.cells
-    return ""
-
-
-@pytest.mark.parametrize("path", leaves(WHOLE), ids=lambda path: ".".join(map(str, path)))
-def test_a_value_that_is_spoilt_is_named(path):
-    assert accept_or_refuse(WHOLE) == ""
-    for junk in NONSENSE:
-        message = accept_or_refuse(spoilt(WHOLE, path, junk))
-        key = message.removeprefix("config: ").partition(": ")[0].split(".")
-        place = [*map(str, path)]
-        assert key[: len(place)] == place[: len(key)], message

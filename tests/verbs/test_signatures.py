@@ -111,17 +111,3 @@ def test_a_number_without_a_unit_is_in_si_where_it_may_be() -> None:
     for wrong in ("fast", "1e400", "-1", "nan"):
         with pytest.raises(accelstudy.InputError):
             bare.read(wrong)
-
-
-def test_a_kind_says_once_what_it_means() -> None:
-    """The docstrings of all verbs that take it say the same, and so do their commands."""
-    for name in ("model", "approach", "prior", "seed"):
-        said = {
-            kinds.meanings(function(verb))[name]
-            for verb in ("calibrate", "diagnose")
-            if name in kinds.meanings(function(verb))
-        }
-        assert len(said) == 1
-        (option,) = (p for p in main.commands["diagnose"].params if p.name == name)
-        assert isinstance(option, click.Option)
-        assert said == {str(option.help).replace("  [", " [")}
