@@ -58,26 +58,21 @@ class Criterion:
     power: int = 1
     degree: int = 1
 
-    def squares(self, normal: Array) -> Array:
-        """Mean squares, (a, ...), of normal matrices (..., u, u)."""
-        return self._squares(cofactors(normal))
-
-    def _squares(self, inverse: Array) -> Array:
+    def squares(self, inverse: Array) -> Array:
+        """Mean squares, (a, ...), of cofactor matrices (..., u, u)."""
         flat = inverse.reshape(*inverse.shape[:-2], -1)
         return np.asarray(self.forms.reshape(len(self.forms), -1) @ flat.T)
 
     def value(self, normal: Array) -> Array:
         """Values, (...), of normal matrices (..., u, u)."""
-        logs = np.log(self.squares(normal))
-        if len(logs) == 1:
-            return np.asarray(logs[0])
+        logs = np.log(self.squares(cofactors(normal)))
         mean = np.logaddexp.reduce(self.power * logs) - np.log(len(logs))
         return np.asarray(mean / self.power)
 
     def gradient(self, normal: Array) -> Array:
         """Derivative by symmetric normal matrices (..., u, u), symmetric."""
         inverse = cofactors(normal)
-        squares = self._squares(inverse)
+        squares = self.squares(inverse)
         relative = squares / squares.max(axis=0)
         weights = relative**self.power / np.sum(relative**self.power, axis=0) / squares
         return np.asarray(-inverse @ np.tensordot(weights, self.forms, (0, 0)) @ inverse)
@@ -139,4 +134,4 @@ def rms_tilt(task: Task, directions: ArrayLike) -> Array:
     """
     if not task.information(directions).determined:
         return np.full(2, np.inf)
-    return np.sqrt(get_criterion(MINIMAX, task).squares(task.normal(directions)))
+    return np.sqrt(get_criterion(MINIMAX, task).squares(cofactors(task.normal(directions))))

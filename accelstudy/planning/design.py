@@ -219,8 +219,6 @@ def search_for(
     **constraints: Any,
 ) -> Search:
     """Search that the keywords of `accelstudy.find_positions` ask for, checked."""
-    bounds.SIGMA_FORCE.check_key(key("sigma"), sigma)
-    bounds.SIGMA_ANGLE.check_key(key("robot_sigma"), robot_sigma / units.MGON)
     bounds.SIGMA_GRAVITY.check_key(key("gravity_sigma"), gravity_sigma)
     task = Task(
         get_model(model),

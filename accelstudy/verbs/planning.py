@@ -23,7 +23,6 @@ Duration = Annotated[Quantity, InputQuantity("s", 0.01, DAY)]
 MovingTime = Annotated[Quantity, InputQuantity("s", most=3600.0)]
 Sigma = Annotated[Quantity, InputQuantity("m/s^2", 1e-9, 10.0)]
 RobotSigma = Annotated[Quantity, angle(1e-6 * MGON, 10 * GON)]
-Force = Annotated[Quantity, InputQuantity("m/s^2")]
 HalfTurn = Annotated[Quantity, angle(-200 * GON, 200 * GON)]
 QuarterTurn = Annotated[Quantity, angle(-100 * GON, 100 * GON)]
 
@@ -110,9 +109,9 @@ def find_positions(
     model: kinds.ModelName = "bias-scale-nonorthogonality",
     approach: kinds.ApproachName = "robot",
     positions: Annotated[int, Range(1, 300)] = 24,
-    sigma: Force = "2mm/s^2",
-    robot_sigma: Annotated[Quantity, InputQuantity("rad")] = "3.2mgon",
-    gravity_sigma: Force = "0",
+    sigma: Sigma = "2mm/s^2",
+    robot_sigma: RobotSigma = "3.2mgon",
+    gravity_sigma: Annotated[Quantity, InputQuantity("m/s^2")] = "0",
     criterion: str = "I",
     tilt_range: Annotated[Quantity, angle(GON / 10, 100 * GON)] = kinds.TILT_RANGE,
     after: kinds.SchemeName | None = None,
