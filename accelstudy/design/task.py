@@ -15,7 +15,7 @@ from accelstudy.basics.levels import MAX_TILT_GON
 from accelstudy.basics.units import GON
 from accelstudy.design.estimability import estimability
 from accelstudy.design.information import Information, position_rows, prior_rows
-from accelstudy.leveling.error import ATTITUDES, cap_forces, tilt_error
+from accelstudy.leveling.error import error_in_use
 from accelstudy.positions.points import evenly_spread
 from accelstudy.positions.scheme import Scheme
 from accelstudy.sensors.sensor import SensorModel
@@ -108,11 +108,10 @@ class Task:
     @cached_property
     def tilt_weights(self) -> Array:
         """Quadratic forms of scaled errors: mean squares of roll and of pitch, (2, u, u), rad²."""
-        u, model = len(self.names), self.model
-        ideal, f_b = np.zeros(model.n_parameters), cap_forces(self.tilt_range, ATTITUDES)
-        error = tilt_error(model, ideal, model, ideal, f_b, hold=HoldPlan().use(f_b, 1))
-        weights = np.zeros((2, u, u))
-        weights[:, : len(ideal), : len(ideal)] = error.quadratic
+        estimated = self.model.n_parameters
+        weights = np.zeros((2, len(self.names), len(self.names)))
+        error = error_in_use(self.model, max_tilt=self.tilt_range)
+        weights[:, :estimated, :estimated] = error.quadratic
         return weights / np.outer(self.scale, self.scale)
 
     def missing(self, directions: Array) -> str:

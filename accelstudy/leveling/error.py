@@ -143,3 +143,26 @@ def tilt_error(
         linear=np.einsum("ka,kau->au", offset, slope) / len(f_b),
         quadratic=np.einsum("kau,kaw->auw", slope, slope) / len(f_b),
     )
+
+
+def error_in_use(
+    model: SensorModel,
+    parameters: Array | None = None,
+    max_tilt: float = MAX_TILT_GON * GON,
+    g: float = STANDARD_GRAVITY,
+    hold: HoldConditions | None = None,
+) -> TiltError:
+    """Tilt error of a calibration in use, as a function of the errors of its parameters.
+
+    Parameters
+    ----------
+    model : SensorModel
+    parameters : (u,) array, SI; those of an ideal sensor by default
+    max_tilt : float, rad, up to which the sensor is used
+    g : float, m/s²
+    hold : HoldConditions, optional
+        Conditions of the positions, where effects depend on them; use is in like conditions.
+    """
+    at = np.zeros(model.n_parameters) if parameters is None else parameters
+    f_b, used = attitudes_in_use(hold or HoldConditions(order=np.ones(1)), g, max_tilt)
+    return tilt_error(model, at, model, at, f_b, g, used)

@@ -18,12 +18,11 @@ from accelstudy.design.information import Information, position_rows
 from accelstudy.design.search import Search
 from accelstudy.effects import HoldConditions
 from accelstudy.leveling.distribution import Tilt
-from accelstudy.leveling.error import ATTITUDES, TiltError, cap_forces, tilt_error
+from accelstudy.leveling.error import TiltError, error_in_use
 from accelstudy.planning.question import Equipment, Question
 from accelstudy.schemes import Scheme, get_scheme, scheme_names
 from accelstudy.sensors.models import MODELS, NINE, get_model
 from accelstudy.sensors.sensor import SensorModel
-from accelstudy.simulation.hold_plan import HoldPlan
 from accelstudy.simulation.sessions import Noise
 
 if TYPE_CHECKING:
@@ -165,9 +164,7 @@ def every_effect() -> tuple[SensorModel, dict[str, list[int]]]:
 @cache
 def error_up_to(tilt_range: float) -> TiltError:
     """Tilt error up to a tilt, rad, by all parameters of `every_effect`."""
-    model, forces = every_effect()[0], cap_forces(tilt_range, ATTITUDES)
-    ideal = np.zeros(model.n_parameters)
-    return tilt_error(model, ideal, model, ideal, forces, hold=HoldPlan().use(forces, 1))
+    return error_in_use(every_effect()[0], max_tilt=tilt_range)
 
 
 def information_of(

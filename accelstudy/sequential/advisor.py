@@ -32,6 +32,7 @@ from accelstudy.design.estimability import is_blind
 from accelstudy.design.information import Information, position_rows
 from accelstudy.effects import HoldConditions
 from accelstudy.effects.hold_conditions import REFERENCE_TEMPERATURE
+from accelstudy.leveling.error import error_in_use
 from accelstudy.sensors.models import get_model
 from accelstudy.sensors.sensor import SensorModel
 from accelstudy.sequential.advice import Advice
@@ -132,7 +133,9 @@ def advise(
         position_rows(
             model, approach, noise, directions, campaign.gravity, holds, angle_errors(campaign)
         ),
-        promise.tilt_error(model, at, campaign.gravity, campaign.hold if n else holds),
+        error_in_use(
+            model, at, promise.tilt_range, campaign.gravity, campaign.hold if n else holds
+        ),
         promise,
         upper_bound,
         typical_sizes(model, known.information.rows.shape[1]),

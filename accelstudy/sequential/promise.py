@@ -22,10 +22,7 @@ from numpy.typing import ArrayLike, NDArray
 from scipy import special
 
 from accelstudy.basics.arrays import Array
-from accelstudy.basics.units import STANDARD_GRAVITY
-from accelstudy.effects import HoldConditions
-from accelstudy.leveling.error import TiltError, attitudes_in_use, tilt_error
-from accelstudy.sensors.sensor import SensorModel
+from accelstudy.leveling.error import TiltError
 
 LEVEL = 0.975
 """Level of the upper confidence bound of the variance at each look, for 0.95 over all looks."""
@@ -48,28 +45,6 @@ class Promise:
 
     accuracy: float
     tilt_range: float
-
-    def tilt_error(
-        self,
-        model: SensorModel,
-        parameters: Array | None = None,
-        gravity: float = STANDARD_GRAVITY,
-        hold: HoldConditions | None = None,
-    ) -> TiltError:
-        """Tilt error of a calibration as a function of the errors of its parameters.
-
-        Parameters
-        ----------
-        model : SensorModel
-        parameters : (u,) array, SI; those of an ideal sensor by default
-        gravity : float, m/s²
-        hold : HoldConditions, optional
-            Conditions of the positions, where effects depend on them; use is in like conditions.
-        """
-        at = np.zeros(model.n_parameters) if parameters is None else parameters
-        of_one = HoldConditions(order=np.ones(1))
-        f_b, used = attitudes_in_use(hold or of_one, gravity, self.tilt_range)
-        return tilt_error(model, at, model, at, f_b, gravity, used)
 
     def is_kept(self, rms: Array) -> NDArray[np.bool_]:
         """Whether the rms of roll and of pitch, (..., 2), both keep the promise."""

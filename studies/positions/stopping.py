@@ -30,6 +30,7 @@ from accelstudy.design.estimability import estimability
 from accelstudy.design.information import Information, position_rows
 from accelstudy.drawing import style
 from accelstudy.leveling.angles import angles_of, tilt_slope
+from accelstudy.leveling.error import error_in_use
 from accelstudy.schemes import get_scheme
 from accelstudy.sensors.models import NINE, get_model
 from accelstudy.sequential import choice
@@ -92,7 +93,7 @@ def simulate(
         contain the truth.
     """
     cofactors = estimability(FIXED, MODEL, get_approach(approach), NOISE).cofactors
-    error = Promise(np.inf, TILT_RANGE).tilt_error(MODEL)
+    error = error_in_use(MODEL, max_tilt=TILT_RANGE)
     promise = Promise(multiple * float(error.rms_of_all(cofactors).max()), TILT_RANGE)
     directions = choice.candidate_positions(choice.DEFAULTS[approach])
     rows = position_rows(MODEL, get_approach(approach), NOISE, directions)

@@ -16,6 +16,7 @@ from accelstudy.campaign.calibration.fit import fit_campaign
 from accelstudy.campaign.format import read_campaign
 from accelstudy.leveling.angles import specific_force
 from accelstudy.leveling.attitudes import attitude
+from accelstudy.leveling.error import error_in_use
 from accelstudy.schemes import get_scheme
 from accelstudy.sensors.frames import parse_frame
 from accelstudy.sensors.models import get_model
@@ -83,7 +84,7 @@ def test_the_next_position_is_worth_more_than_others(begun):
     directions = candidate_positions("cube")
     advice = advice_for(measured, model, get_approach("gravity"), promise, directions)
     before = fit_campaign(measured, model, get_approach("gravity"))
-    error_of = promise.tilt_error(model, before.parameters, before.gravity, measured.hold)
+    error_of = error_in_use(model, before.parameters, 30 * GON, before.gravity, measured.hold)
 
     def after(direction):
         """Mean variance of roll and pitch with one position more, without noise."""

@@ -10,6 +10,7 @@ from usual import NINE
 from accelstudy.approaches import get_approach
 from accelstudy.basics.units import GON, MGON
 from accelstudy.design.information import Information, position_rows
+from accelstudy.leveling.error import error_in_use
 from accelstudy.schemes import get_scheme
 from accelstudy.sequential.choice import Chooser, Knowledge, candidate_positions, typical_sizes
 from accelstudy.sequential.promise import LEAST_REDUNDANCY, LEVEL, Promise, bound
@@ -20,7 +21,7 @@ from accelstudy.simulation.sessions import Noise
 
 def test_only_what_is_not_yet_accurate_enough_counts():
     promise = Promise(10.0, 30 * GON)
-    error = promise.tilt_error(NINE)
+    error = error_in_use(NINE, max_tilt=30 * GON)
     roll, pitch = error.quadratic
     rms = np.array([[12.0, 9.0], [9.0, 12.0], [12.0, 12.0], [9.0, 9.0]])
     for weight, expected in zip(
@@ -36,7 +37,7 @@ def chooser(approach, scheme, directions=None, accuracy=10 * MGON):
     chosen = get_scheme(scheme).directions if directions is None else directions
     promise = Promise(accuracy, 30 * GON)
     rows = position_rows(NINE, get_approach(approach), Noise(), chosen)
-    error = promise.tilt_error(NINE)
+    error = error_in_use(NINE, max_tilt=30 * GON)
     variance = partial(bound, sigma_dof=np.inf)
     return Chooser(chosen, rows, error, promise, variance, typical_sizes(NINE, 9))
 
