@@ -146,8 +146,6 @@ def check_size(where: str, forces: Array, gravity: float, conversion: Conversion
         f", nowhere near gravity, {gravity:g} m/s²; give another `unit`, `scale` or `offset`, or "
         "other `columns`"
     )
-    if unit == "counts":
-        remedy += f"; without an offset the scale is about {gravity / number:.3g} m/s² per count"
     if near(norm, STANDARD_GRAVITY):
         remedy = f", which does not fit a gravity of {gravity:g} m/s²; give `gravity`"
     elif better:

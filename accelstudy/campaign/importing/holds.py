@@ -47,9 +47,6 @@ MAX_WANDER = 2.0
 """A hold whose standard deviation is more than this many thresholds of a window is none."""
 SATURATED = "the sensor is saturated there"
 TURNS = "the force changes there by more than its noise, since the sensor turns slowly"
-QUIET_RATIO = 10.0
-"""Noise floor of what looks like rest, as a multiple of the noise of the quietest windows, from
-which on it is motion: those are in rests that are shorter than a hold."""
 SLOW_RATIO, QUICK_RATIO = 2.0, 0.2
 """Allan deviation, as a multiple of that of white noise, from which on a motion is slow, such as
 that of a hand; seconds, below which motions are vibrations, which do not harm a mean."""
@@ -344,23 +341,15 @@ def _moves(holds: Holds, records: Sequence[Array]) -> bool:
     """Whether the windows "at rest" show motion: large compared with gravity, and slow.
 
     The noise of a sensor at rest is below a few hundredths of gravity. The vibration of a machine
-    may be larger, but it is quick and averages out like white noise. A human body moves slowly, and
-    some windows between its moves are much quieter.
+    may be larger, but it is quick and averages out like white noise. A human body moves slowly.
     """
     floor = holds.windows.floor
     if not floor > MAX_REST_NOISE * min(holds.radius, STANDARD_GRAVITY):
         return False
-    if floor > QUIET_RATIO * _quietest(holds.windows):
-        return True
-    sd = float(np.sqrt(np.mean(holds.noise.sd**2)))
-    if sd == 0:  # all samples of a coarse sensor are rounded alike
-        return False
     curve = pooled_deviation(records, holds.log.step)
     reliable = (curve.differences >= MIN_DIFFERENCES) & (curve.tau >= QUICK_RATIO)
-    if not reliable.any():
-        return True
-    white = sd * np.sqrt(holds.log.step / curve.tau[reliable])
-    return bool(np.max(curve.pooled[reliable] / white) > SLOW_RATIO)
+    white = np.sqrt(np.mean(holds.noise.sd**2) * holds.log.step / curve.tau)
+    return bool(not reliable.any() or np.any(reliable & (curve.pooled > SLOW_RATIO * white)))
 
 
 def _never_still(log: Log, windows: Windows, why: str, size: int | None = None) -> InputError:

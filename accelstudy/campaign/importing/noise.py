@@ -110,7 +110,10 @@ def hold_noise(records: Sequence[Array], step: float, resolution: ArrayLike = 0.
     """
     means = np.array([record.mean(axis=0) for record in records])
     center, directed = _center(means)
-    frames = np.array([_frame(mean - center) for mean in means])
+    # Orthonormal columns, the first of them along the mean. A sensor that settles or is nudged
+    # turns a little. That moves the force across its mean, and along it in the second order only.
+    # So the scatter along the mean is the sensor's own noise.
+    frames = np.linalg.svd((means - center)[:, :, None])[0]
     covariances = np.array([np.cov(record, rowvar=False) for record in records])
     squares = np.einsum("nij,nik,nkj->j", frames, covariances, frames) / len(records)
     sd = np.sqrt(np.maximum(squares, 0.0))
@@ -149,18 +152,6 @@ def _center(means: Array) -> tuple[Array, bool]:
         if norms.max() <= MAX_NORM_RATIO * norms.min():
             return center, True
     return np.zeros(3), False
-
-
-def _frame(force: Array) -> Array:
-    """Orthonormal columns, the first of them along `force`.
-
-    A sensor that settles or is nudged turns a little. That moves the force across its mean, and
-    along it in the second order only. So the scatter along the mean is the sensor's own noise.
-    """
-    size = float(np.linalg.norm(force))
-    if size == 0:
-        return np.eye(3)
-    return np.linalg.svd(force[:, None] / size)[0]
 
 
 def fit_sphere(forces: Array) -> tuple[Array, float] | None:

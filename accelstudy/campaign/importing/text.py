@@ -73,9 +73,7 @@ class TextTable(RawTable):
         lines = enumerate(_read(self.path)[0].decode().split("\n"), 1)
         below = ((n, self.rows.cells(line)) for n, line in lines if n > self.rows.first)
         of_rows = ((n, cells) for n, cells in below if cells is not None)
-        number, cells = next(islice(of_rows, row, None), (0, []))
-        if not number:
-            return f"row {row + 1}", "unreadable"
+        number, cells = next(islice(of_rows, row, None))
         if any(cells[self.rows.width :]):
             return f"line {number}", f"{len(cells)} columns instead of {self.rows.width}"
         if place >= len(cells):
@@ -182,8 +180,6 @@ class _Rows:
     def _take_names(self, names: list[str], units: Sequence[str]) -> bool:
         """Take names, with units behind them, if there is one for each column."""
         longest = max(map(len, self._sample))
-        while len(names) > longest and not names[-1]:
-            names = names[:-1]
         empty = all(row[len(names) :][:1] == [""] for row in self._sample)
         if len(names) == self.width - 1 and empty:
             self.width = len(names)
