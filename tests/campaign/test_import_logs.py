@@ -90,7 +90,7 @@ def test_matlab(tmp_path, name, variable):
     np.testing.assert_array_equal(log.forces, FORCES)
 
 
-def test_parquet_and_gzip(tmp_path):
+def test_parquet(tmp_path):
     frame = pd.DataFrame(TABLE, columns=["time", "accX", "accY", "accZ"]).assign(label="a")
     frame.to_parquet(tmp_path / "log.parquet")
     columns = {"fx": "accX", "fy": "accY", "fz": "accZ"}
@@ -102,8 +102,6 @@ def test_parquet_and_gzip(tmp_path):
     log = open_log(tmp_path / "log.parquet", columns=columns)
     assert len(log.time) == N - 1
     assert "row 21, column accY (fy): nan" in log.warnings()[0]
-    (tmp_path / "log.csv.gz").write_bytes(gzip.compress(lines(before=["t,fx,fy,fz"]).encode()))
-    np.testing.assert_array_equal(open_log(tmp_path / "log.csv.gz").forces, FORCES)
 
 
 def test_three_columns_need_no_names(tmp_path):

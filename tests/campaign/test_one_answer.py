@@ -1,13 +1,9 @@
 """What a campaign determines, and how good it is, is the same in every command."""
 
-import re
-
 import numpy as np
 import pandas as pd
-import pytest
-import yaml
-from calling import refusal, succeed
-from campaign_helpers import FIVE_AXES, made
+from calling import succeed
+from campaign_helpers import made
 from page_helpers import text_of
 
 import accelstudy as acs
@@ -26,29 +22,6 @@ def written(folder, directions, seed, outside=None):
     forces += 0 if outside is None else outside(directions)
     write_campaign(made(forces, sigma=0.002), folder)
     return folder
-
-
-NEARLY = FIVE_AXES + 1e-4 * np.random.default_rng(3).standard_normal((9, 3))
-
-
-@pytest.mark.parametrize("directions", [FIVE_AXES, NEARLY], ids=["rank 8", "nearly"])
-def test_nine_positions_of_rank_eight(tmp_path, directions):
-    """Some draws of the noise made them nine, with scales of 100 000 ppm."""
-    directions = directions / np.linalg.norm(directions, axis=1, keepdims=True)
-    campaign = written(tmp_path / "nine", directions, seed=24)
-    says = "rank 8 of 9: s_x, s_y, s_z"
-    assert says in refusal("calibrate", campaign, "--out", tmp_path / "calibrated")
-    assert says in refusal("diagnose", campaign, "--out", tmp_path / "diagnosis")
-    assert says in refusal("effects", "--campaign", campaign)
-    said = succeed("advise", campaign, "--tilt-accuracy", "5mgon").output
-    assert "not determined yet" in said
-    assert "CAN STOP" not in said.upper()
-    # And before anything is measured.
-    scheme = tmp_path / "nine.yaml"
-    scheme.write_text(yaml.safe_dump({"scheme": "nine", "directions": directions.tolist()}))
-    assert re.search(r" 8/9 .* s_x, s_y, s_z", succeed("schemes", scheme).output)
-    asked = ("--attitudes", scheme, "--positions", 9, "--approach", "gravity")
-    assert says in refusal("design", *asked, "--out", tmp_path / "design.yaml")
 
 
 def test_the_tilt_error_of_a_calibration_is_one_number(tmp_path):

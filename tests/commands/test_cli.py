@@ -1,10 +1,8 @@
 """The command line: what it lists, and that bad input ends with one line and exit status 2."""
 
-import re
 import subprocess
 import sys
 
-import click
 from calling import call, succeed
 from click.testing import CliRunner
 
@@ -21,17 +19,6 @@ def output(*arguments):
 
 def test_version():
     assert output("--version").split()[-1] == accelstudy.__version__
-
-
-def test_help_names_every_command():
-    text = output("--help")
-    assert "..." not in text.partition("Campaigns")[2]  # what each does fits into its line
-    for name, command in main.commands.items():
-        assert re.search(rf"^  {name} ", text, re.MULTILINE)
-        assert "Usage:" in output(name, "--help")
-        for option in command.params:
-            if isinstance(option, click.Option):
-                assert re.match(r"[A-Z'].*[.\]]$", option.help or ""), (name, option.name)
 
 
 def completed(words, shell="bash"):
@@ -81,9 +68,6 @@ def test_the_unit_of_angles_is_an_option_and_a_variable(monkeypatch):
     monkeypatch.setenv("ACCELSTUDY_ANGLE_UNIT", "deg")
     assert "pole/deg" in output("schemes", "mclaren-24")
     assert output("schemes", "mclaren-24", "--angle-unit", "gon") == gon
-
-
-# --- a study -------------------------------------------------------------------------------------
 
 
 # --- bad input -----------------------------------------------------------------------------------

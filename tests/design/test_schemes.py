@@ -83,16 +83,6 @@ def test_directions_that_are_none_are_refused(directions):
         scheme(directions)
 
 
-def test_properties():
-    found = scheme(LOPSIDED)
-    np.testing.assert_allclose(found.directions[1], [np.sqrt(0.5), 0, np.sqrt(0.5)])
-    assert found.n_positions == 3
-    assert found.fourth_moment == pytest.approx(1 / 4 / 9)
-    assert found.pole_distance == 0
-    assert scheme(LOPSIDED[:2]).pole_distance == pytest.approx(np.pi / 4)
-    assert scheme(-LOPSIDED[:2]).pole_distance == pytest.approx(np.pi / 4)
-
-
 def test_rotation_is_about_fixed_axes():
     turned = scheme(LOPSIDED).rotated(np.radians([15, 25, 35]))
     expected = GENERIC.apply(scheme(LOPSIDED).directions.copy())

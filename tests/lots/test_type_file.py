@@ -92,14 +92,6 @@ def test_a_type_is_an_observation_of_the_parameters():
     np.testing.assert_allclose(bound.parameters, cofactors @ right, atol=2e-2 * free.sigma.max())
 
 
-def test_a_sensor_that_is_not_of_the_type_is_refused():
-    rng = np.random.default_rng(13)
-    known = dict.fromkeys(MODEL.parameter_names, (0.0, 1e-3))
-    other = measured("mclaren-24", np.full(9, 1e-2), rng)
-    assert fitted(other).global_test.accepted
-    assert not fitted(replace(other, sensor_type=SensorType("t", 9, known))).global_test.accepted
-
-
 def test_a_type_tells_nothing_of_the_noise_of_positions():
     """A vague prior changes nothing; six positions leave nothing that tells their noise."""
     rng = np.random.default_rng(16)
@@ -121,6 +113,7 @@ def test_sigmas_contain_that_a_sensor_is_of_another_type(scheme):
     other = measured(scheme, np.full(9, 1e-2), np.random.default_rng(17))
     fit = fitted(replace(other, sensor_type=usual))
     assert fit.state == "rejected"
+    assert scheme == "faces-6" or fitted(other).global_test.accepted
     assert np.all(np.abs(fit.parameters - 1e-2) < fit.sigmas_95 * fit.sigma)
 
 
