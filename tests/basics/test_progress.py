@@ -5,7 +5,7 @@ from contextlib import redirect_stderr
 
 import pytest
 
-from accelstudy.basics.progress import feedback, say, show, stage, track, warn
+from accelstudy.basics.progress import feedback, show, stage, track, warn
 
 
 class Terminal(io.StringIO):
@@ -48,14 +48,6 @@ def test_what_takes_long_shows_on_a_terminal_alone(monkeypatch):
     assert screen.getvalue() == ""
     monkeypatch.setenv("TERM", "dumb")
     assert seen(Terminal()) == ""
-
-
-def test_a_command_says_what_it_did_unless_it_is_quiet(capsys):
-    with feedback():
-        say("done")
-    with feedback(quiet=True):
-        say("more")
-    assert capsys.readouterr().out == "done\n"
 
 
 def test_a_stage_goes_when_the_work_fails():

@@ -4,7 +4,7 @@ import math
 
 import pytest
 
-from accelstudy.basics.units import GON, MGON, angles_in
+from accelstudy.basics.units import GON, MGON
 from accelstudy.basics.wording import estimate, interval, number, p_value, quantity_text
 
 
@@ -35,12 +35,6 @@ def test_a_number_has_three_significant_digits(value, expected):
 ])  # fmt: skip
 def test_a_round_quantity_gets_no_zeros(value, unit, expected):
     assert quantity_text(value, unit) == expected
-
-
-def test_a_quantity_is_in_the_unit_that_the_user_chose():
-    with angles_in("deg"):
-        assert quantity_text(math.radians(0.01), "rad") == "10 mdeg"
-        assert quantity_text(math.radians(27.04321), "rad") == "27.0 deg"
 
 
 @pytest.mark.parametrize(("value", "sigma", "expected"), [

@@ -80,8 +80,3 @@ def test_closed_forms_of_a_perfect_robot(scheme):
     ratio = design(scheme, approach=ROBOT, noise=noise).sigma / design(scheme, noise=noise).sigma
     for kind, expected in perfect_robot_ratio(get_scheme(scheme).directions).items():
         np.testing.assert_allclose(ratio[KINDS[kind]], expected, rtol=1e-9)
-
-
-def test_schemes_without_octahedral_moments_are_told_apart():
-    assert not has_octahedral_moments(get_scheme("random-38").directions)
-    assert not has_octahedral_moments(get_scheme("mclaren-24").directions[:-1])

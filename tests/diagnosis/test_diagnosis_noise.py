@@ -9,13 +9,11 @@ from quality_helpers import SIGMA, draw, solutions
 from scipy import stats
 from usual import BOTH, GRAVITY, ROBOT, G
 
-from accelstudy.adjustment.quality import global_test
 from accelstudy.diagnosis.evidence.detection import Chance
 from accelstudy.diagnosis.evidence.noise import (
     axis_test,
     colour_test,
     coloured_density,
-    level_test,
     resolution_test,
     tail_test,
     unequal_axes_density,
@@ -115,19 +113,6 @@ def test_readings_without_steps_have_none(scheme):
 
 
 # --- closed forms --------------------------------------------------------------------------------
-
-
-@pytest.mark.parametrize("size", [0.3, 1.0, 1.7])
-def test_the_level_test_is_the_two_sided_chi_square_test(size):
-    z = size * np.random.default_rng(7).standard_normal(40)
-    found = level_test(global_test(z @ z, 40))
-    chi2 = stats.chi2(40)
-    tails = chi2.cdf(z @ z), chi2.sf(z @ z)
-    assert found.p_value == pytest.approx(2 * min(tails), rel=1e-12)
-    assert found.statistic == pytest.approx(z @ z)
-    factor = np.sqrt(z @ z / 40)
-    assert f"{max(factor, 1 / factor):.3g} times" in found.remark
-    assert ("larger" if factor > 1 else "smaller") in found.remark
 
 
 def test_the_test_within_holds_is_the_f_test():

@@ -12,7 +12,7 @@ from usual import GRAVITY, ROBOT, G
 from accelstudy.adjustment import calibrate
 from accelstudy.adjustment.linear_theory import LinearTheory
 from accelstudy.design.estimability import estimability
-from accelstudy.effects import HoldConditions, TemperatureCourse, effect_names, get_effect
+from accelstudy.effects import Effect, HoldConditions, TemperatureCourse, effect_names, get_effect
 from accelstudy.effects.hold_conditions import MIN_STEP
 from accelstudy.effects.saturation import ROUND_WIDTH
 from accelstudy.leveling.angles import roll_pitch, specific_force
@@ -78,10 +78,14 @@ def test_every_effect_has_a_formula_here_and_is_of_the_sensor_or_of_its_rig():
 def test_what_people_read_of_an_effect(name):
     effect = get_effect(name)
     assert effect.name == name
-    assert effect.equation
     assert effect.__doc__
-    low, high = effect.typical
-    assert 0 < low < high
+    # Those that come from the formula, and those that an effect says itself.
+    for equation, (low, high) in (
+        (Effect.equation.fget(effect), Effect.typical.fget(effect)),
+        (effect.equation, effect.typical),
+    ):
+        assert equation
+        assert 0 < low < high
     assert len({p.unit for p in effect.parameters}) == 1
     assert all(p.symbol.startswith("$") and p.symbol.endswith("$") for p in effect.parameters)
 

@@ -4,7 +4,6 @@ import pytest
 import yaml
 
 import accelstudy as acs
-from accelstudy.effects import Effect, effect_names, get_effect
 from accelstudy.sensors.models import get_model
 from accelstudy.study.config import parse_study
 
@@ -43,17 +42,6 @@ def test_a_part_of_an_effect_takes_its_share_of_the_true_values():
         "grids": [{"models": "all", "schemes": "faces-6", "replicates": 2}],
     })  # fmt: skip
     assert study.truth(["saturation(knee=9)[k_sat_z]"]) == {"k_sat_z": 0.3}
-
-
-# --- what an effect need not say -----------------------------------------------------------------
-
-
-@pytest.mark.parametrize("name", effect_names())
-def test_defaults_come_from_the_formulas(name):
-    effect = get_effect(name)
-    assert Effect.equation.fget(effect)
-    low, high = Effect.typical.fget(effect)
-    assert 0 < low < high < 1
 
 
 def test_a_campaign_of_a_composition_has_each_effect_once():

@@ -9,7 +9,6 @@ from scipy import stats
 from study_helpers import NINE, grid, make_cells
 
 from accelstudy.basics.units import MGON, STANDARD_GRAVITY
-from accelstudy.effects import get_effect
 from accelstudy.leveling.error import cap_forces
 from accelstudy.sensors.sensor import SensorModel
 from accelstudy.simulation.hold_plan import HoldPlan
@@ -36,15 +35,6 @@ def test_what_is_drawn_is_uniform_and_independent():
     drawn = np.stack([hold.column(name) for name in ranges])
     assert np.abs(np.corrcoef(drawn)[np.triu_indices(3, 1)]).max() < 4.5 / math.sqrt(n)
     np.testing.assert_array_equal(FULL.hold(n).yaw, hold.yaw)
-
-
-@pytest.mark.parametrize(
-    ("effect", "column"),
-    [("thermal_scale", "temperature"), ("bias_drift", "time"), ("settling", None), ("bias", None)],
-)
-def test_what_is_missing_for_an_effect(effect, column):
-    assert HoldPlan().missing(get_effect(effect)) == column
-    assert FULL.missing(get_effect(effect)) is None
 
 
 # --- leveling ------------------------------------------------------------------------------------

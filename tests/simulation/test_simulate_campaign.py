@@ -18,12 +18,6 @@ def values(entries):
 NINE_EFFECTS = ("bias", "scale", "nonorthogonality")
 
 
-def test_an_effect_of_the_model_can_be_given():
-    truth = simulate(effects=("bias: 1, 2, 3",)).truth
-    assert [entry["name"] for entry in truth["sensor"]] == ["scale", "nonorthogonality"]
-    assert values(truth["effects"]) == {"b_x": 1.0, "b_y": 2.0, "b_z": 3.0}
-
-
 def test_sizes_are_typical():
     found = np.abs([[*values(simulate(seed=s).truth["sensor"]).values()] for s in range(200)])
     for i, name in enumerate(NINE_EFFECTS):

@@ -56,12 +56,6 @@ def test_the_readings_of_the_robot_are_not_drawn_where_nothing_needs_them():
             assert rng.standard_normal() == after.standard_normal()
 
 
-def test_a_wrong_gravity_is_believed_but_not_felt():
-    observed = draw(2, gravity_error=1e-3)
-    np.testing.assert_array_equal(observed.gravity, [G + 1e-3, G + 1e-3])
-    np.testing.assert_array_equal(observed.forces, draw(2).forces)
-
-
 @pytest.mark.parametrize(
     ("rate", "duration", "n"), [(100, 2, 200), (50, 2, 100), (1, 1, 1), (0.1, 2, 1), (100, 0, 1)]
 )

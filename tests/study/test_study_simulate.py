@@ -19,7 +19,7 @@ from accelstudy.files.tables import git_commit, read_origin, read_table, write_t
 from accelstudy.study import tables as module
 from accelstudy.study.replicates import ESTIMATES
 from accelstudy.study.statistics import statistics
-from accelstudy.study.tables import collect, read_estimates
+from accelstudy.study.tables import read_estimates
 
 GRAVITY, ROBOT = f"{NINE}/mclaren-24/gravity", f"{NINE}/mclaren-24/robot"
 
@@ -100,22 +100,14 @@ def test_origin_is_in_every_file(tmp_path):
         assert json.loads(pq.read_schema(path).metadata[b"accelstudy"]) == read_origin(path)
 
 
-@pytest.fixture
-def fresh():
-    """The commit is asked for anew, now and afterwards."""
-    git_commit.cache_clear()
-    yield
-    git_commit.cache_clear()
-
-
 def git(folder, *words):
     given = ("-c", "user.name=n", "-c", "user.email=e@example.org")
     ran = subprocess.run(["git", "-C", folder, *given, *words], capture_output=True, text=True)
     return ran.stdout.strip()
 
 
-@pytest.mark.usefixtures("fresh")
 def test_a_repository_around_an_installed_package_is_not_its_own(tmp_path, monkeypatch):
+    commit = git_commit.__wrapped__  # which asks each time
     installed = tmp_path / "env" / "tables.py"
     installed.parent.mkdir()
     installed.write_text("")
@@ -124,14 +116,12 @@ def test_a_repository_around_an_installed_package_is_not_its_own(tmp_path, monke
     monkeypatch.setattr(tables, "__file__", str(installed))
     git(tmp_path, "init")
     git(tmp_path, "commit", "--allow-empty", "--message", "somebody's project")
-    assert git_commit() == "unknown"
-    git_commit.cache_clear()
+    assert commit() == "unknown"
     git(tmp_path, "add", "--all")
     git(tmp_path, "commit", "--message", "a copy under git")
-    assert git_commit() == (head := git(tmp_path, "rev-parse", "HEAD"))
-    git_commit.cache_clear()
+    assert commit() == (head := git(tmp_path, "rev-parse", "HEAD"))
     beside.write_text("an edit")
-    assert git_commit() == f"{head}+"
+    assert commit() == f"{head}+"
 
 
 # --- whole or not at all -------------------------------------------------------------------------
@@ -169,15 +159,6 @@ def test_reading_files_and_folders(tmp_path):
     assert read_table(paths[1])["x"].tolist() == [1, 11]
     assert read_table(paths)["x"].tolist() == read_table(tmp_path)["x"].tolist() == [0, 10, 1, 11]
     assert read_table(paths, columns=["x"]).columns.tolist() == ["x"]
-
-
-def test_parts_are_joined_in_the_order_of_the_cells(tmp_path):
-    paths = [tmp_path / f"{name}.parquet" for name in "ab"]
-    for path, cells in zip(paths, (["c", "a", "a"], ["d", "b"]), strict=True):
-        write_table(path, pd.DataFrame({"cell": cells, "x": range(len(cells))}), PROVENANCE)
-    table = collect(paths, ["a", "b", "c", "d"])
-    assert table["cell"].tolist() == ["a", "a", "b", "c", "d"]
-    assert table["x"].tolist() == [1, 2, 1, 0, 0]
 
 
 def test_a_cell_in_two_files_of_a_folder_is_an_error(tmp_path):
