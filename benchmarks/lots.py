@@ -19,7 +19,9 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.stats import binomtest
 
+from accelstudy.approaches import get_approach
 from accelstudy.basics.errors import InputError
+from accelstudy.lots.evidence import Sensor
 from accelstudy.lots.lot import weigh_lot
 from accelstudy.sensors.models import get_model
 from studies.hidden.physics.designs import APPROACHES, DESIGNS
@@ -123,7 +125,8 @@ def judged(job):
     asked, made = lot_of(kind, np.random.SeedSequence([seed, number, i]))
     case = asked.case
     truths = [truth for _, truth in made]
-    lot = weigh_lot([campaign for campaign, _ in made], get_model(MODEL))
+    model, by = get_model(MODEL), get_approach(case.approach)
+    lot = weigh_lot([Sensor(one, model, by, 1 + i) for i, (one, _) in enumerate(made)])
     classes = {}
     for truth in truths if kind.named else ():
         for effect, same in zip(truth.effects, truth.classes, strict=True):

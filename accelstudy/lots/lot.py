@@ -17,10 +17,7 @@ from typing import TypeAlias
 
 import numpy as np
 
-from accelstudy.approaches import Approach
 from accelstudy.basics.errors import InputError
-from accelstudy.campaign.calibration.fit import usual_approach
-from accelstudy.campaign.session import Campaign
 from accelstudy.diagnosis.decision.problem import BaseFit
 from accelstudy.lots.evidence import Sensor, SensorEvidence
 from accelstudy.lots.file_format import Alternative, OddSensor, SensorState
@@ -134,21 +131,12 @@ class LotDiagnosis:
         return states
 
 
-def weigh_lot(
-    campaigns: Sequence[Campaign],
-    model: SensorModel,
-    approach: Approach | None = None,
-    seed: int = 1,
-    cores: int = 1,
-) -> LotDiagnosis:
+def weigh_lot(sensors: Sequence[Sensor], cores: int = 1) -> LotDiagnosis:
     """Say what the model of sensors of one type lacks, by all of them together.
 
     Parameters
     ----------
-    campaigns : of the sensors, two or more
-    model : SensorModel
-    approach : Approach; by default robot-aided where a campaign has the robot's angles
-    seed : int, of the draws
+    sensors : two or more, of one model
     cores : int, processes that work at once; results do not depend on it
 
     Raises
@@ -156,10 +144,7 @@ def weigh_lot(
     InputError
         If a process is killed.
     """
-    sensors = [
-        Sensor(campaign, model, approach or usual_approach(campaign), seed + i)
-        for i, campaign in enumerate(campaigns)
-    ]
+    model = sensors[0].model
     with _processes(cores, len(sensors)) as mapped:
         passes, effects = [Pass.of(sensors, mapped)], list[LotEffect]()
 

@@ -25,12 +25,11 @@ from accelstudy.campaign.calibration.fit import usual_approach
 from accelstudy.campaign.calibration.result import Calibration
 from accelstudy.campaign.sensor_type import TYPE_FILE
 from accelstudy.campaign.session import Campaign
-from accelstudy.diagnosis.decision.problem import fit_base
 from accelstudy.drawing.saving import save_all
 from accelstudy.drawing.style import FULL, new_figure, say_empty
 from accelstudy.files.outputs import LOT
 from accelstudy.lots.calibration import LotCalibration
-from accelstudy.lots.evidence import either
+from accelstudy.lots.evidence import Sensor, either
 from accelstudy.lots.file_format import LotDocument
 from accelstudy.lots.lot import LotDiagnosis, weigh_lot
 from accelstudy.lots.passes import LEVEL
@@ -84,16 +83,19 @@ class Lot(Result):
 
         Parameters
         ----------
-        campaigns, model, approach, seed, cores : as in `weigh_lot`; campaigns of one name get their
-            numbers behind it, and those of one log count once; what cannot be judged by itself, as
-            it leaves no redundancy, is left out
+        campaigns : of the sensors; those of one name get their numbers behind it, and those of one
+            log count once; what cannot be judged by itself, as it leaves no redundancy, is left out
+        model : SensorModel
+        approach : Approach; by default robot-aided where a campaign has the robot's angles
+        seed : int, of the draws
+        cores : int, as in `weigh_lot`
 
         Raises
         ------
         InputError
             If fewer than two campaigns can be judged.
         """
-        usable, left_out, first = list[Campaign](), dict[str, str](), dict[bytes, str]()
+        usable, left_out, first = list[Sensor](), dict[str, str](), dict[bytes, str]()
         names = distinct([campaign.name for campaign in campaigns])
         for unnamed, own in zip(campaigns, names, strict=True):
             campaign = unnamed.with_header(name=own)
@@ -101,9 +103,11 @@ class Lot(Result):
             if (same := first.setdefault(campaign.forces.tobytes(), own)) != own:
                 left_out[own] = f"{own}: has the readings of {same}; each sensor counts once"
                 continue
+            by = approach or usual_approach(campaign)
+            sensor = Sensor(campaign, model, by, seed + len(usable))
             try:
-                fit_base(campaign, model, approach or usual_approach(campaign))
-                usable.append(campaign)
+                sensor.fit()
+                usable.append(sensor)
             except InputError as error:
                 left_out[own] = str(error)
         if len(usable) < MIN_SENSORS:
@@ -111,8 +115,7 @@ class Lot(Result):
             raise InputError(why or "a lot has two sensors or more; `diagnose` takes one")
         for name, why in left_out.items():
             say(f"not in the lot: {name}: {why.removeprefix(f'{name}: ')}")
-        diagnosis = weigh_lot(usable, model, approach, seed, cores)
-        return cls(LotCalibration.of(diagnosis, model), left_out)
+        return cls(LotCalibration.of(weigh_lot(usable, cores), model), left_out)
 
     @property
     def calibrations(self) -> dict[str, Calibration]:

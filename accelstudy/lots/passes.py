@@ -155,7 +155,7 @@ class Pass:
     def mixture(self) -> Mixture:
         """Posterior of everything that the model of the lot may lack."""
         # What sensors have in common is no noise.
-        pattern = min(self.residuals.p_value_of_pattern, default=1.0) < LEVEL_OF_PATTERN
+        pattern = min(self.residuals.p_values_of_pattern, default=1.0) < LEVEL_OF_PATTERN
         prior = priors_of([name for name in self.classes if not pattern or name not in NOISES])
         own = {n: np.array([one.odds.get(n, 0.0) for one in self.evidence]) for n in prior}
         mixture, typical = Mixture(prior, own), {}
@@ -193,7 +193,7 @@ class Pass:
         """P-values of what the sensors have in common: sizes of effects, and any pattern."""
         each = [_smallest([one.p_value for one in shapes]) for shapes in self.shown.values()]
         sizes = [_smallest(each)] if each else []
-        return [*sizes, *self.residuals.p_value_of_pattern]
+        return [*sizes, *self.residuals.p_values_of_pattern]
 
     @property
     def missing(self) -> bool:

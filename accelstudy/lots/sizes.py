@@ -164,8 +164,8 @@ class LotResiduals:
         return ShownEffect(spec, normal, right, size, float(weights @ right @ size))
 
     @cached_property
-    def p_value_of_pattern(self) -> list[float]:
-        """Probability that noise alone has as much in common, residual by residual; [] if none has.
+    def p_values_of_pattern(self) -> list[float]:
+        """Probability that noise alone has as much in common, residual by residual; [] without it.
 
         It shows what no name explains, in sensors that were in the same positions and conditions;
         in other ones, it shows nothing. Residuals are taken as in `shown`.

@@ -214,7 +214,7 @@ def test_noise_has_as_much_in_common_as_is_said(noise):
     for _ in range(150):
         *_, residuals = type_of(rng, np.zeros((N, 3)), noise)
         told = residuals.shown(NAMES[0])
-        said.append((told.p_value, *residuals.p_value_of_pattern))
+        said.append((told.p_value, *residuals.p_values_of_pattern))
     for values in np.transpose(said):
         assert stats.kstest(values, "uniform").pvalue > 1e-3
 
@@ -226,9 +226,9 @@ def test_what_is_too_small_for_one_sensor_shows_in_all():
     # A pattern without a name does so where sensors were in the same positions.
     pattern = 0.5 * rng.standard_normal(ROWS)
     same = [frame_of(np.zeros((ROWS, 3)), pattern + z) for z in rng.standard_normal((N, ROWS))]
-    assert LotResiduals(same, [LEVEL_OF_NOISE] * N).p_value_of_pattern[0] < 1e-6
+    assert LotResiduals(same, [LEVEL_OF_NOISE] * N).p_values_of_pattern[0] < 1e-6
     fewer = frame_of(np.zeros((ROWS - 1, 3)), pattern[1:])
-    assert LotResiduals([*same, fewer], [LEVEL_OF_NOISE] * (N + 1)).p_value_of_pattern == []
+    assert LotResiduals([*same, fewer], [LEVEL_OF_NOISE] * (N + 1)).p_values_of_pattern == []
 
 
 def test_nothing_missing_is_called_so_at_one_level():
