@@ -75,13 +75,34 @@ class Design(Result):
         return f"{len(self.directions)} positions"
 
     @classmethod
-    def of(cls, *, positions: int, starts: int, **keywords: Any) -> Design:
+    def of(
+        cls,
+        *,
+        model: str,
+        approach: str,
+        positions: int,
+        sigma: float,
+        robot_sigma: float,
+        gravity_sigma: float,
+        criterion: str,
+        tilt_range: float,
+        after: str | None,
+        attitudes: str,
+        seed: int,
+        starts: int,
+        **constraints: Any,
+    ) -> Design:
         """Search by the keywords of `accelstudy.find_positions`, and order what is found."""
+        bounds.SIGMA_GRAVITY.check_key(key("gravity_sigma"), gravity_sigma)
+        noise = Noise(sigma, robot_sigma, gravity_sigma)
+        measured = get_scheme(after).directions if after else np.zeros((0, 3))
         with stage("search"):
-            search = search_for(**keywords)
+            task = Task(get_model(model), get_approach(approach), noise, tilt_range, measured)
+            allowed = replace(find_attitudes(attitudes, SPACES), **constraints)
+            search = Search(task, get_criterion(criterion, task), allowed, seed)
             found = search.optimum(positions, starts)
-            order = field_order(search.task, found)
-        return cls(search, found[order], starts, keywords["after"])
+            order = field_order(task, found)
+        return cls(search, found[order], starts, after)
 
     @property
     def state(self) -> str:
@@ -202,33 +223,6 @@ class Design(Result):
         title = f"{name} ({kind}-optimal)" if len(kind) == 1 else f"{name} ({kind})"
         source = f"accelstudy design, seed {self.search.seed}"
         write_scheme(file, name, title, source, self.directions, self.provenance)
-
-
-def search_for(
-    *,
-    model: str,
-    approach: str,
-    criterion: str,
-    sigma: float,
-    robot_sigma: float,
-    gravity_sigma: float,
-    tilt_range: float,
-    after: str | None,
-    attitudes: str,
-    seed: int,
-    **constraints: Any,
-) -> Search:
-    """Search that the keywords of `accelstudy.find_positions` ask for, checked."""
-    bounds.SIGMA_GRAVITY.check_key(key("gravity_sigma"), gravity_sigma)
-    task = Task(
-        get_model(model),
-        get_approach(approach),
-        Noise(sigma, robot_sigma, gravity_sigma),
-        tilt_range,
-        measured=get_scheme(after).directions if after else np.zeros((0, 3)),
-    )
-    allowed = replace(find_attitudes(attitudes, SPACES), **constraints)
-    return Search(task, get_criterion(criterion, task), allowed, seed)
 
 
 def _both(rms: Any) -> str:
