@@ -64,8 +64,6 @@ class Interval:
     @cached_property
     def years(self) -> float:
         """Years until the error exceeds the accuracy; 0 if it does at once, at most `MAX_YEARS`."""
-        if self.error(0.0) > self.accuracy:
-            return 0.0
 
         def beyond(years: float) -> float:
             return self.error(years) - self.accuracy
@@ -74,7 +72,7 @@ class Interval:
         first = next((t for t in steps if beyond(t) > 0), None)
         if first is None:
             return MAX_YEARS
-        return float(optimize.brentq(beyond, first - steps[1], first))
+        return float(optimize.brentq(beyond, first - steps[1], first)) if first else 0.0
 
     @property
     def accuracy_mgon(self) -> float:
