@@ -5,7 +5,7 @@ import math
 import pytest
 
 from accelstudy.basics.units import GON, MGON
-from accelstudy.basics.wording import estimate, interval, number, p_value, quantity_text
+from accelstudy.basics.wording import estimate, number, p_value, quantity_text
 
 
 @pytest.mark.parametrize(("value", "expected"), [
@@ -53,8 +53,3 @@ def test_a_value_is_as_exact_as_its_sigma_says(value, sigma, expected):
 def test_a_p_value_has_its_sign_of_relation():
     shown = [p_value(p) for p in (1e-13, 2.44e-5, 0.0321, 0.5, 0.9999)]
     assert shown == ["p < 10⁻¹²", "p = 2.4 · 10⁻⁵", "p = 0.032", "p = 0.5", "p > 0.999"]
-
-
-def test_an_interval_is_that_of_its_ends():
-    assert interval(1.0, 20.0) == "1.00 … 20.0"
-    assert interval(math.nan, math.nan) == ""

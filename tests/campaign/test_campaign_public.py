@@ -1,4 +1,4 @@
-"""Public measurements: the registry knows the files, and a file is got whole or not at all."""
+"""Public measurements: a file is got whole or not at all."""
 
 import hashlib
 
@@ -6,7 +6,7 @@ import pytest
 from calling import refused
 
 from accelstudy.campaign.importing import public
-from accelstudy.campaign.importing.public import PublicData, public_data, public_file
+from accelstudy.campaign.importing.public import PublicData, public_file
 
 CONTENT = bytes(range(256)) * 64
 
@@ -26,19 +26,6 @@ def fetch(tmp_path, monkeypatch):
         return public_file("name", tmp_path)
 
     return get
-
-
-@pytest.mark.parametrize("name", public_data())
-def test_the_registry_says_how_a_file_is_read(name):
-    known = public_data()[name]
-    assert known.url.startswith("https://raw.githubusercontent.com/")
-    assert known.licence in ("MIT", "BSD-2-Clause", "Apache-2.0")
-    settings = known.settings
-    if settings is not None:
-        assert {*settings.columns} == {"fx", "fy", "fz"}
-        assert (settings.scale is not None) == (settings.unit == "counts")
-        timed = settings.rate is not None or settings.time is not None
-        assert settings.means or settings.block is not None or timed
 
 
 def test_a_file_that_is_there_is_not_downloaded(tmp_path, fetch):

@@ -19,12 +19,6 @@ FULL = HoldPlan(30.0, (10.0, 40.0), "random", (0.5, 2.0), "random", seed=3)
 # --- conditions ----------------------------------------------------------------------------------
 
 
-def test_without_a_plan_nothing_is_known_but_that_the_yaw_is_zero():
-    hold = HoldPlan().hold(5)
-    assert hold.time is hold.temperature is hold.vibration is None
-    assert hold.yaw.tolist() == [0.0] * 5
-
-
 def test_what_is_drawn_is_uniform_and_independent():
     n = 5000
     hold = FULL.hold(n)

@@ -62,11 +62,6 @@ def words(folder, *arguments, snakefile=ROOT / "Snakefile", cores=2, config=TINY
     return [*arguments, "--snakefile", snakefile, "--cores", cores, "--configfile", path]
 
 
-def command(folder, *arguments, **options):
-    """Words of a command that runs Snakemake."""
-    return [str(word) for word in (*SNAKEMAKE, *words(folder, *arguments, **options))]
-
-
 def run(folder, *arguments, **options):
     return snakemake(folder, *words(folder, *arguments, **options))
 
@@ -145,7 +140,7 @@ def test_killed_and_resumed(single, tmp_path):
     """On two cores, in two runs: the same comes out, beside a hidden folder of the first."""
     estimates = tmp_path / "results" / "tiny" / "estimates"
     with subprocess.Popen(
-        command(tmp_path, *TABLE_PATHS),
+        [*map(str, (*SNAKEMAKE, *words(tmp_path, *TABLE_PATHS)))],
         cwd=tmp_path, env=ENVIRONMENT, start_new_session=True,
         stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL,
     ) as process:  # fmt: skip
