@@ -47,9 +47,8 @@ class LogImport:
     @classmethod
     def of(cls, log: Any, figure: bool = True, **given: Any) -> LogImport:
         """Import a log by the keywords of `find_holds`, checked."""
-        settings = settings_of(given, log.settings if isinstance(log, Log) else None)
         logs = [log] if isinstance(log, Log | pd.DataFrame) else files_of(as_sequence(log))
-        return cls(*import_log(logs, settings, reference_of(given)), figure)
+        return cls(*import_log(logs, settings_of(given), reference_of(given)), figure)
 
     @classmethod
     def of_public(cls, name: str, folder: str | PathLike[str]) -> LogImport:

@@ -251,10 +251,6 @@ def find_saturated(
         return np.zeros(0, dtype=bool)
     read = log.forces[windows.about]
     ends = np.array([read.min(axis=0), read.max(axis=0)])
-    inner = np.array([
-        np.min(read, axis=0, where=read > ends[0], initial=np.inf),
-        np.max(read, axis=0, where=read < ends[1], initial=-np.inf),
-    ])  # fmt: skip
     noise = noise_before_rounding(step, np.median([f.std(axis=0, ddof=1) for f in forces], axis=0))
     with np.errstate(divide="ignore", invalid="ignore"):
         steps = np.where(step > 0, step / noise, 0.0)
@@ -263,12 +259,11 @@ def find_saturated(
     saturated = []
     for each in forces:
         n = len(each)
-        at_end, beside = (np.sum(each == x[:, None], axis=1) for x in (ends, inner))
+        at_end = np.sum(each == ends[:, None], axis=1)
         middle = normal.inv_cdf(min(MAX_BEYOND / n, 0.5))
         share = np.array([normal.cdf(middle + step) for step in steps])
         explained = n * share + MIN_WITHIN * np.sqrt(n * share * (1 - share))
-        piled = at_end > np.maximum(MAX_SATURATED_SHARE * n, explained)
-        saturated.append(np.any(piled & (at_end > beside)))
+        saturated.append(np.any(at_end > np.maximum(MAX_SATURATED_SHARE * n, explained)))
     return np.array(saturated)
 
 

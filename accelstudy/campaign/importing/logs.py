@@ -13,7 +13,7 @@ from accelstudy.basics.arguments import tidy
 from accelstudy.basics.bounds import SIGMA_FORCE
 from accelstudy.basics.errors import InputError
 from accelstudy.basics.units import MGON, UNITS, display_unit, to_display
-from accelstudy.basics.wording import short_list
+from accelstudy.basics.wording import comma_list, short_list
 from accelstudy.campaign.gross_errors.recognition import check_plausible
 from accelstudy.campaign.header import LogLayout
 from accelstudy.campaign.importing.columns import ANGLES, AXES, MEANS, SDS, thermometers
@@ -90,22 +90,20 @@ def import_log(
 
 
 def _check_kinds(files: int, settings: ImportSettings, reference: ReferenceLog | None) -> None:
-    """Check that means, blocks, several files and a reference go together."""
-    means, block = settings.means, settings.block is not None
-    for wrong, text in (
-        (means and reference, "a table of means (`means`) has no holds in time: leave out "
-         "`reference_log`"),
-        (means and files > 1, "a table of means is one file of one sensor"),
-        (means and block, "a table of means (`means`) has a row for each position, no block "
-         "(`block`)"),
-        (settings.robot_sigma is not None and not means, "`robot_sigma`: the robot's angles go "
-         "with a table of means (`means`)"),
-        (reference and (block or files > 1), "`reference_log` goes with one log that has a time, "
-         "not with several files or `block`"),
-        (block and files > 1, f"a log of blocks (`block`) is one file, not {files}"),
-    ):  # fmt: skip
-        if wrong:
-            raise InputError(text)
+    """Check that it is said in one way what a position is."""
+    kinds = {
+        "several files": files > 1,
+        "`block`": settings.block is not None,
+        "`means`": settings.means,
+        "`reference_log`": reference is not None,
+    }
+    if len(ways := [kind for kind, chosen in kinds.items() if chosen]) > 1:
+        raise InputError(
+            f"{comma_list(ways)} do not go together: a position is a hold of a log, with a "
+            "reference or without, or a file, or a block, or a row of means"
+        )
+    if settings.robot_sigma is not None and not settings.means:
+        raise InputError("`robot_sigma`: the robot's angles go with a table of means (`means`)")
 
 
 def _are_short(log: Log, settings: ImportSettings) -> bool:
@@ -139,7 +137,7 @@ def _campaign_of_means(log: Log, settings: ImportSettings) -> Campaign:
             f"columns {', '.join(angles)} are left out; `robot_sigma` takes them for the robot's"
         )
         rows = rows.drop(columns=angles)
-    if settings.time is None:
+    if "time" not in log.settings:
         rows = rows.drop(columns="time")
     if not len(rows):
         raise InputError(f"{log.path}: no row of numbers")

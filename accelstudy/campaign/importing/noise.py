@@ -141,17 +141,14 @@ def _center(means: Array) -> tuple[Array, bool]:
     The offset of counts may be unknown; with a large one no mean points along gravity. If the
     attitudes differ enough, the sphere through the means shows it.
     """
-    centers = [np.zeros(3)]
+    center = np.zeros(3)
     if len(means) > 5 and (sphere := fit_sphere(means)) is not None:
-        center, radius = sphere
         thinnest = np.linalg.svd(means - means.mean(axis=0), compute_uv=False)[-1]
-        if thinnest > MIN_SPREAD * radius * np.sqrt(len(means)):
-            centers.insert(0, center)
-    for center in centers:
-        norms = np.linalg.norm(means - center, axis=1)
-        if norms.max() <= MAX_NORM_RATIO * norms.min():
-            return center, True
-    return np.zeros(3), False
+        if thinnest > MIN_SPREAD * sphere[1] * np.sqrt(len(means)):
+            center = sphere[0]
+    norms = np.linalg.norm(means - center, axis=1)
+    directed = bool(norms.max() <= MAX_NORM_RATIO * norms.min())
+    return center * directed, directed
 
 
 def fit_sphere(forces: Array) -> tuple[Array, float] | None:

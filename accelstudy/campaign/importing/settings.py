@@ -95,10 +95,8 @@ class ImportSettings(LogLayout):
         return self.model_dump(include=fields, exclude_unset=True, exclude_none=True)
 
 
-def settings_of(
-    given: Mapping[str, Any], layout: Mapping[str, Any] | None = None
-) -> ImportSettings:
-    """Settings of the file `settings`, overlaid with those of a layout, and these with keywords.
+def settings_of(given: Mapping[str, Any]) -> ImportSettings:
+    """Settings of the file `settings`, overlaid with keywords.
 
     Raises
     ------
@@ -112,5 +110,5 @@ def settings_of(
         if name in ImportSettings.model_fields
         and not (value is None or value is False or value == ())
     }
-    content = overlay({} if path is None else read_layer(path), {**(layout or {}), **own})
+    content = overlay({} if path is None else read_layer(path), own)
     return validate(ImportSettings, content, path or "settings", names={k: key(k) for k in own})
