@@ -66,16 +66,14 @@ class Congruence:
     def test(self) -> Test:
         """Whether epochs differ by no more than their covariance matrices say."""
         f, nu = self.freedom
-        statistic = self._squares / f if f else 0.0
-        p_value = f_tail(statistic, f, nu) if f else 1.0
+        statistic = self._squares / f
+        p_value = f_tail(statistic, f, nu)
         return Test(statistic=statistic, dof=[f, nu], p_value=p_value, level=LEVEL)
 
     @cached_property
     def freedom(self) -> tuple[int, float]:
         """Degrees of freedom f and ν of F; ν is infinite with stated noise."""
         n, p = self.estimates.shape
-        if not p:
-            return 0, np.inf
         parts = self._about_the_mean[1].reshape(n, p, n, p)
         means = np.einsum("iaia->i", parts)
         return (n - 1) * p, dof_of_squares(means, np.einsum("iajb->ij", parts**2), self.dof)
@@ -106,7 +104,7 @@ class Congruence:
         needed then is taken back.
         """
         left, found = list(range(self.estimates.shape[1])), list[int]()
-        while not self.of(left).test.congruent:
+        while left and not self.of(left).test.congruent:
             found.append(left.pop(self._explains_most(left)))
         for i in found[:-1]:
             if self.of(sorted([*left, i])).test.congruent:

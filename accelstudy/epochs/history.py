@@ -282,8 +282,10 @@ class History(Result):
 
     @property
     def _times(self) -> NDArray[Any]:
-        """Times of the calibrations, for the axis of a figure: dates, or numbers without any."""
-        return np.array(self.dates, dtype="datetime64[us]") if self.dates else np.arange(1, 3)
+        """Times of the calibrations, for the axis of a figure: dates, or words without any."""
+        if not self.dates:
+            return np.array(["first", "second"])
+        return np.array(self.dates, dtype="datetime64[us]")
 
     def draw(self, ax: Axes) -> None:
         """Draw the deviation of each parameter from the first calibration, over its sigma."""
@@ -316,20 +318,17 @@ class History(Result):
         ax.errorbar(times, values, halves, fmt="o", color=INK, capsize=2, linewidth=0.8, ms=3)
         ax.set_title(symbol(parameter.name) + (f" ({' and '.join(found)})" if found else ""))
         ax.set_ylabel(shown_unit(unit))
-        if not self.dates:
-            ax.set_xticks(times)
-            return
-        from matplotlib.dates import AutoDateLocator, ConciseDateFormatter
+        if self.dates:
+            from matplotlib.dates import AutoDateLocator, ConciseDateFormatter
 
-        locator = AutoDateLocator(minticks=2, maxticks=5)  # type: ignore[no-untyped-call]
-        formatter = ConciseDateFormatter(locator)  # type: ignore[no-untyped-call]
-        ax.xaxis.set(major_locator=locator, major_formatter=formatter)
-        if not self.courses:
-            return
-        model = self.courses[k].model
-        style = "-" if {"drifts", "steps"} & {*found} else ":"
-        values = to_display(model.design @ model.estimates, unit)
-        ax.plot(times, values, style, color=group_colour(group_of(parameter.name)))
+            locator = AutoDateLocator(minticks=2, maxticks=5)  # type: ignore[no-untyped-call]
+            formatter = ConciseDateFormatter(locator)  # type: ignore[no-untyped-call]
+            ax.xaxis.set(major_locator=locator, major_formatter=formatter)
+        if self.courses:
+            model = self.courses[k].model
+            style = "-" if {"drifts", "steps"} & {*found} else ":"
+            values = to_display(model.design @ model.estimates, unit)
+            ax.plot(times, values, style, color=group_colour(group_of(parameter.name)))
 
 
 def _check_alike(calibrations: Sequence[SensorCalibration]) -> None:
