@@ -5,7 +5,6 @@ North-east-down convention: at level f_b = (0, 0, −g).
 
 from __future__ import annotations
 
-from functools import cache
 from typing import Any
 
 import numpy as np
@@ -15,6 +14,7 @@ from accelstudy.basics.arrays import Array
 from accelstudy.effects import HoldConditions
 from accelstudy.effects.components import Number, Vector
 from accelstudy.sensors.sensor import SensorModel
+from accelstudy.symbolic.tracing import jacobian_of
 
 MAX_CURVATURE = 0.2
 """Size of the terms of second order, beside those of first order, beyond which standard deviations
@@ -55,13 +55,6 @@ def specific_force(roll: Number, pitch: Number, g: Number, xp: Any = np) -> Vect
     )
 
 
-@cache
-def _jacobian_function() -> Any:
-    from accelstudy.symbolic.tracing import jacobian_of
-
-    return jacobian_of(roll_pitch, 3)
-
-
 def jacobian(f: ArrayLike) -> Array:
     """Partial derivatives of roll and pitch with respect to the specific force (eq. 7).
 
@@ -73,8 +66,7 @@ def jacobian(f: ArrayLike) -> Array:
     -------
     (..., 2, 3) array, rad/(m/s²); derived from `roll_pitch`, of which it is the only definition.
     """
-    f = np.asarray(f, dtype=float)
-    return np.asarray(_jacobian_function()(f))
+    return np.asarray(jacobian_of(roll_pitch, 3)(np.asarray(f, dtype=float)))
 
 
 def near_pole(angles: ArrayLike, sigma: ArrayLike) -> NDArray[np.bool_]:

@@ -91,18 +91,15 @@ def sort_by_time(unsorted: Iterable[Candidate]) -> list[Candidate]:
     return sorted(unsorted, key=lambda c: (c.seconds, c.tilt.rms.max(), c.model.n_parameters))
 
 
-def schemes_for(most_positions: int) -> list[Scheme]:
-    """Schemes of the literature, and evenly spread ones, in the order of their size."""
-    names = {*scheme_names(), *(f"{FAMILY}-{n}" for n in SIZES)}
-    schemes = [get_scheme(name) for name in sorted(names)]
-    fitting = [scheme for scheme in schemes if scheme.n_positions <= most_positions]
-    return sorted(fitting, key=lambda scheme: (scheme.n_positions, scheme.name))
-
-
 def candidates(question: Question) -> list[Candidate]:
-    """All calibrations in known schemes whose positions determine their model and check it."""
-    schemes = schemes_for(question.most_positions)
-    return [c for scheme in track(schemes, "calibrations") for c in in_scheme(question, scheme)]
+    """All calibrations in known schemes whose positions determine their model and check it.
+
+    They are schemes of the literature, and evenly spread ones, in the order of their size.
+    """
+    names = {*scheme_names(), *(f"{FAMILY}-{n}" for n in SIZES)}
+    schemes = sorted(map(get_scheme, names), key=lambda scheme: (scheme.n_positions, scheme.name))
+    fitting = [scheme for scheme in schemes if scheme.n_positions <= question.most_positions]
+    return [c for scheme in track(fitting, "calibrations") for c in in_scheme(question, scheme)]
 
 
 def shortest(question: Question) -> Candidate | None:

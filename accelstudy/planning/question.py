@@ -105,11 +105,6 @@ class Question:
         unknown = [effect for effect in self.sizes if getattr(self.sheet, effect) is None]
         return [effect for effect in unknown if effect not in ESTIMATED]
 
-    @property
-    def is_linear(self) -> bool:
-        """Whether the sensor is assumed to be linear."""
-        return "nonlinearity" in self.sheet.assumed
-
     def accuracy(self, tilt: Tilt | SimulatedTilt) -> float:
         """Tilt accuracy by the measure that is asked for, rad."""
         if self.confidence is None:

@@ -9,7 +9,7 @@ kernels can be generated from the same definitions.
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from functools import cached_property, partial, reduce
+from functools import cache, cached_property, partial, reduce
 from types import CodeType, FunctionType
 from typing import Any, ClassVar, Protocol, TypeAlias
 
@@ -178,6 +178,7 @@ def traced(trace: Callable[[Any], Traced]) -> cached_property[TracedFunction]:
     return cached_property(function)
 
 
+@cache
 def jacobian_of(function: Callable[..., Sequence[Any]], n: int) -> Callable[[Array], Array]:
     """Jacobian of a function ``function(components, xp)`` of `n` components, by tracing.
 
