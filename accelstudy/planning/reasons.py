@@ -9,7 +9,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from accelstudy.basics.wording import words
-from accelstudy.effects import get_effect
+from accelstudy.effects import Effect, get_effect
 from accelstudy.leveling.distribution import NOISE, Tilt
 from accelstudy.planning.candidates import (
     OF_RIG,
@@ -31,24 +31,14 @@ class Spoiler:
 
     Attributes
     ----------
-    effect : str
+    effect : Effect
     size : float, SI; inf if no size of it matters
     verdict : "spoils it", "may spoil it" or "does not matter"
     """
 
-    effect: str
+    effect: Effect
     size: float
     verdict: str
-
-    @property
-    def usual_sizes(self) -> tuple[float, float]:
-        """Sizes in good and in cheap equipment, SI."""
-        return get_effect(self.effect).typical
-
-
-def effect_unit(effect: str) -> str:
-    """SI unit of the parameters of an effect."""
-    return get_effect(effect).parameters[0].unit
 
 
 def limits(question: Question, candidate: Candidate) -> str:
@@ -81,11 +71,11 @@ def spoilers(question: Question, candidate: Candidate) -> list[Spoiler]:
         effects.append("gravity_error")
     squares = _tilt(question, candidate, dict.fromkeys(effects, 1.0)).squares
     sizes = []
-    for effect in effects:
-        each = float(np.sqrt(squares[effect].max()))
+    for effect in map(get_effect, effects):
+        each = float(np.sqrt(squares[effect.name].max()))
         # An effect without influence leaves rounding errors only.
         size = math.inf if each < 1e-6 else question.target / each
-        low, high = get_effect(effect).typical
+        low, high = effect.typical
         verdict = "spoils it"
         if size > low:
             verdict = "may spoil it" if size <= high else "does not matter"

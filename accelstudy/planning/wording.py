@@ -1,39 +1,45 @@
 """A plan in words: first the answer in plain sentences, then its table and reasons.
 
-The sentences stand in `wording.txt.j2`; here are the phrases of which it makes them, as `w`.
+The sentences stand in `wording.txt.j2`, which has what it says them of as `w`.
 """
 
 from __future__ import annotations
 
-import sys
 from typing import TYPE_CHECKING
 
 import numpy as np
 
-from accelstudy.basics.units import MGON, angle_note, display_unit  # noqa: F401
+from accelstudy.basics.units import MGON, angle_note, display_unit
 from accelstudy.basics.wording import amount, quantity_text, words
+from accelstudy.effects import get_effect
 from accelstudy.pages import render_lines
 from accelstudy.planning import reasons
-from accelstudy.planning.candidates import shortest  # noqa: F401
+from accelstudy.planning.candidates import shortest
 from accelstudy.planning.question import HOW, Question
-from accelstudy.planning.simulated import QUOTED  # noqa: F401
+from accelstudy.planning.simulated import QUOTED
 
 if TYPE_CHECKING:
     from accelstudy.planning.plan import Plan, PlannedCalibration
 
 SENTENCES = "planning/wording.txt.j2"
-HERE = sys.modules[__name__]
 
 
 def part_lines(part: str, plan: Plan) -> list[str]:
     """Lines of a part of a plan: what to do (answer), reasons or assumptions."""
-    return render_lines(SENTENCES, part, plan, HERE)
+    known = {
+        "reasons": reasons,
+        "shortest": shortest,
+        "assumed_sizes": assumed_sizes,
+        "angle_note": angle_note,
+        "QUOTED": QUOTED,
+    }
+    return render_lines(SENTENCES, part, plan, known)
 
 
 def assumed_sizes(question: Question) -> list[str]:
     """Effects that are taken to have a usual size, as nothing is known of it, in words."""
     sizes = {
-        effect: quantity_text(question.sizes[effect], reasons.effect_unit(effect))
+        effect: quantity_text(question.sizes[effect], get_effect(effect).parameters[0].unit)
         for effect in question.assumed
     }
     return [f"{words(effect)} ({size})" for effect, size in sizes.items()]

@@ -162,7 +162,7 @@ def test_neglected_effects_decide_the_model():
 def test_what_would_spoil_a_plan_is_of_the_size_that_leaves_the_target():
     question = asked(sheet_of_sigma(0.002))
     candidate = _candidate(question, equipment="robot")
-    sizes = {s.effect: s for s in spoilers(question, candidate)}
+    sizes = {s.effect.name: s for s in spoilers(question, candidate)}
     assert math.isinf(sizes["gravity_error"].size)
     assert sizes["base_tilt"].size < 20 * MGON
     for name, spoiler in sizes.items():
