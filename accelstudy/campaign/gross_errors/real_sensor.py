@@ -117,7 +117,7 @@ class RealSensor:
 
     @cached_property
     def _left(self) -> Array:
-        """Part of that lack, of the same shape, that the fitted sensor does not explain."""
+        """What an ideal sensor lacks beyond the fitted one, (n, 3), or (n, 1) of the norm alone."""
         design, lacking = self._design
         return np.asarray(lacking - design @ self._parameters)
 
