@@ -107,7 +107,7 @@ NAMED: dict[str, Callable[[], Attitudes]] = {
 }
 """Sets of attitudes; steps of 30° are judged by eye, those of 25 gon are for a robot."""
 SPACES = ("all", "cube", "hand")
-"""Those that a design chooses from."""
+"""Sets that a design chooses from."""
 
 
 def find_attitudes(name: str, names: Collection[str]) -> Attitudes:

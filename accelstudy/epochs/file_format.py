@@ -49,7 +49,7 @@ class Test(Part):
 
 
 class Rate(Part):
-    """Its drift, per year.
+    """Drift of a parameter, per year.
 
     Attributes
     ----------
@@ -66,7 +66,7 @@ class Rate(Part):
 
 
 class Scatter(Part):
-    """Its scatter from session to session, beside drift or step.
+    """Scatter of a parameter from session to session, beside drift or step.
 
     Attributes
     ----------

@@ -18,7 +18,7 @@ from accelstudy.campaign.calibration.fit import fit_campaign
 from accelstudy.campaign.sensor_type import SensorType
 from accelstudy.leveling.error import attitudes_in_use, tilt_error
 from accelstudy.lots.file_format import Tilt
-from accelstudy.lots.lot import LotDiagnosis, models_with
+from accelstudy.lots.lot import LotDiagnosis, sensors_with
 from accelstudy.lots.passes import LotEffect
 from accelstudy.lots.type_parameter import TypeParameter
 from accelstudy.sensors.models import compose
@@ -35,28 +35,29 @@ class LotCalibration:
     Attributes
     ----------
     diagnosis : LotDiagnosis, all that is missing
-    model : SensorModel, that was diagnosed, without what was found
     fits : mapping of the numbers of sensors to calibrations with the model of the type
     failed : mapping of campaigns to why they have none
     """
 
     diagnosis: LotDiagnosis
-    model: SensorModel
     fits: Mapping[int, CampaignFit]
     failed: Mapping[str, str]
 
     @classmethod
-    def of(cls, diagnosis: LotDiagnosis, model: SensorModel) -> LotCalibration:
+    def of(cls, diagnosis: LotDiagnosis) -> LotCalibration:
         """Calibrate each sensor with all that was found, if that explains the lot."""
         fits, failed = dict[int, CampaignFit](), dict[str, str]()
-        sensors = diagnosis.last.sensors
-        models = models_with(diagnosis.effects, model, len(sensors))
-        for i, (sensor, with_found) in enumerate(zip(sensors, models, strict=True)):
+        for i, sensor in enumerate(sensors_with(diagnosis.effects, diagnosis.passes[0].sensors)):
             try:
-                fits[i] = fit_campaign(sensor.campaign, with_found, sensor.approach)
+                fits[i] = fit_campaign(sensor.campaign, sensor.model, sensor.approach)
             except InputError as error:
                 failed[sensor.campaign.name] = str(error)
-        return cls(diagnosis, model, fits, failed)
+        return cls(diagnosis, fits, failed)
+
+    @property
+    def model(self) -> SensorModel:
+        """The model that was diagnosed, without what was found."""
+        return self.diagnosis.passes[0].sensors[0].model
 
     @property
     def usual(self) -> dict[int, CampaignFit]:

@@ -150,8 +150,7 @@ def weigh_lot(sensors: Sequence[Sensor], cores: int = 1) -> LotDiagnosis:
 
         def weigh_with(effects: Sequence[LotEffect]) -> Pass:
             """Weigh all sensors with some effects, and with the noise that they tell together."""
-            models = models_with(effects, model, len(sensors))
-            return Pass.of(with_noise_of_lot(sensors, models), mapped)
+            return Pass.of(with_noise_of_lot(sensors_with(effects, sensors)), mapped)
 
         while True:
             found = passes[-1].found
@@ -203,22 +202,25 @@ def _explained(now: Pass, effects: Sequence[LotEffect], weigh_with: Weighing) ->
     return now.determined
 
 
-def with_noise_of_lot(sensors: Sequence[Sensor], models: Sequence[SensorModel]) -> list[Sensor]:
-    """Sensors with other models, and with the noise that they tell together."""
+def with_noise_of_lot(sensors: Sequence[Sensor]) -> list[Sensor]:
+    """Sensors with the noise that they tell together."""
 
     def fit(i: int, sigma: float | None) -> BaseFit | None:
         noise = None if sigma is None else NoisePrior(sigma)
         with suppress(InputError):
-            return replace(sensors[i], model=models[i], noise=noise).fit()
+            return replace(sensors[i], noise=noise).fit()
         return None
 
-    each = zip(sensors, models, noises_of_lot(len(sensors), fit), strict=True)
-    return [replace(sensor, model=model, noise=noise) for sensor, model, noise in each]
+    noises = noises_of_lot(len(sensors), fit)
+    return [replace(sensor, noise=noise) for sensor, noise in zip(sensors, noises, strict=True)]
 
 
-def models_with(effects: Sequence[LotEffect], model: SensorModel, n: int) -> list[SensorModel]:
-    """Models of n sensors with some effects, each with its own times of what is sudden."""
-    return [extended(model, [one.specs[i] for one in effects if one.spec]) for i in range(n)]
+def sensors_with(effects: Sequence[LotEffect], sensors: Sequence[Sensor]) -> list[Sensor]:
+    """Sensors with some effects in their models, each with its own times of what is sudden."""
+    return [
+        replace(sensor, model=extended(sensor.model, [one.specs[i] for one in effects if one.spec]))
+        for i, sensor in enumerate(sensors)
+    ]
 
 
 def extended(model: SensorModel, specs: Iterable[str]) -> SensorModel:

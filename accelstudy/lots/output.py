@@ -115,7 +115,7 @@ class Lot(Result):
             raise InputError(why or "a lot has two sensors or more; `diagnose` takes one")
         for name, why in left_out.items():
             say(f"not in the lot: {name}: {why.removeprefix(f'{name}: ')}")
-        return cls(LotCalibration.of(weigh_lot(usable, cores), model), left_out)
+        return cls(LotCalibration.of(weigh_lot(usable, cores)), left_out)
 
     @property
     def calibrations(self) -> dict[str, Calibration]:

@@ -81,7 +81,7 @@ class LotEffect(NamedTuple):
 
     @property
     def is_noise(self) -> bool:
-        """Whether it is that the noise is not as stated, most probably."""
+        """Whether the most probable name is a kind of wrong noise."""
         return self.names[0] in NOISES
 
     def is_one_of(self, effects: Sequence[LotEffect]) -> bool:
@@ -184,7 +184,7 @@ class Pass:
 
     @property
     def p_value_of_usual(self) -> float:
-        """That of the sensors which are not odd."""
+        """P-value of the sensors that are not odd."""
         usual = [one for i, one in enumerate(self.evidence) if i not in self.odd]
         return _smallest([*_combined(usual), *self._in_common])
 

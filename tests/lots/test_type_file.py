@@ -51,7 +51,7 @@ def type_of(sensors, folder, effects=()):
         each=[SensorState(campaign=one.name, names=[], posterior=1.0) for one in sensors],
         effects=effects, model=MODEL,
     )  # fmt: skip
-    assert write_type(LotCalibration(lot, MODEL, fits, {}), folder)
+    assert write_type(LotCalibration(lot, fits, {}), folder)
     return folder / "type.yaml"
 
 

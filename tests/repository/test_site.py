@@ -134,7 +134,7 @@ def _lot():
     one, model = Pass(sensors, tuple(each)), get_model("bias-scale")
     assert one.found is not None
     lot = LotDiagnosis((one, one), model, (one.found,))
-    return Lot(LotCalibration(lot, model, {}, {}), {}).content
+    return Lot(LotCalibration(lot, {}, {}), {}).content
 
 
 def test_the_reference_says_what_the_kinds_of_keywords_mean():
