@@ -101,7 +101,7 @@ class Lot(Result):
             campaign = unnamed.with_header(name=own)
             # Noise never repeats: the same numbers are the same log, whatever its folder.
             if (same := first.setdefault(campaign.forces.tobytes(), own)) != own:
-                left_out[own] = f"{own}: has the readings of {same}; each sensor counts once"
+                left_out[own] = f"has the readings of {same}; each sensor counts once"
                 continue
             by = approach or usual_approach(campaign)
             sensor = Sensor(campaign, model, by, seed + len(usable))
@@ -109,12 +109,12 @@ class Lot(Result):
                 sensor.fit()
                 usable.append(sensor)
             except InputError as error:
-                left_out[own] = str(error)
+                left_out[own] = str(error).removeprefix(f"{own}: ")
+        reasons = [f"{name}: {why}" for name, why in left_out.items()]
         if len(usable) < MIN_SENSORS:
-            why = next(iter(left_out.values()), "")
-            raise InputError(why or "a lot has two sensors or more; `diagnose` takes one")
-        for name, why in left_out.items():
-            say(f"not in the lot: {name}: {why.removeprefix(f'{name}: ')}")
+            raise InputError([*reasons, "a lot has two sensors or more; `diagnose` takes one"][0])
+        for reason in reasons:
+            say(f"not in the lot: {reason}")
         return cls(LotCalibration.of(weigh_lot(usable, cores)), left_out)
 
     @property
