@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
@@ -93,7 +94,7 @@ def read_type(path: str | Path, model: SensorModel) -> SensorType:
         If the file is none of a type, its model is another one, or it tells of too few sensors.
     """
     content = read_layer(path)
-    if "parameters" not in content:
+    if not isinstance(content.get("parameters"), Mapping):  # those of a calibration are a list
         raise InputError(f"{path}: no file of a type; `accelstudy lot` writes one, {TYPE_FILE}")
     read = validate(TypeFile, content, path)
     if {*read.parameters} != {*model.parameter_names}:

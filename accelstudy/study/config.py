@@ -209,10 +209,11 @@ class SensorNoise(ConfigSection):
     sigma_mps2 : standard deviation of the mean of a position, per axis, m/s²
     """
 
-    retired = {  # noqa: RUF012
-        "per": "sigma_mps2 is that of a position's mean, σ/√n of n samples: leave out per, rate_hz "
-        "and duration_s"
-    }
+    retired = dict.fromkeys(
+        ("per", "rate_hz", "duration_s"),
+        "sigma_mps2 is that of a position's mean, σ/√n of n samples: leave out per, rate_hz and "
+        "duration_s",
+    )
 
     sigma_mps2: kinds.SigmaForce = 0.002
 
@@ -453,11 +454,8 @@ class Study(Configuration):
 
     retired = {  # noqa: RUF012
         "keep": "every calibration is stored in estimates/: leave it out",
-        "control": "linear theory is always the control variate: leave it out",
         "presets": "the rows of Table 1 are cells of `grids`: leave it out",
         "schemes": "write positions into a YAML file, and its path into `grids`",
-        "rare": "quantiles of small shares, such as 1e-6, are in the table quantiles where "
-        "replicates are enough: leave it out",
     }
 
     study: Annotated[str, AfterValidator(_name)] = Field(

@@ -10,11 +10,6 @@ KEYWORDS = {
     "apply": NO_DELIMITER,
     "data_sheet": NO_DELIMITER,
     "diagnose": {"replicates": "nothing is simulated; linear theory says what simulations find"},
-    "export": {
-        "level": "roll = atan2(-f_y, -f_z) and pitch = atan2(f_x, hypot(f_y, f_z)) of the "
-        "calibrated force in frd (guide 'On a device'); `accelstudy apply` gives them with their "
-        "sigmas"
-    },
     "find_holds": {
         **NO_DELIMITER,
         "join": "holds in one attitude are positions each",
@@ -34,16 +29,19 @@ KEYWORDS = {
     "plan": {
         "reference": "`accelstudy import --reference-log` takes a calibrated sensor",
         "robot_accuracy": "`robot_sigma` takes it",
-        "schemes": "`accelstudy simulate --scheme` says what a scheme of yours leaves",
+        **dict.fromkeys(
+            ("scheme", "schemes"), "`accelstudy.simulate(scheme=...)` of Python says what it leaves"
+        ),
     },
-    "simulate": {"robot_accuracy": "`robot_sigma` takes it"},
+    "read_log": NO_DELIMITER,
     "simulate_campaign": {
-        **dict.fromkeys(("gross", "gross_error"), "change the rows of positions.csv"),
+        **dict.fromkeys(
+            ("gross", "gross_error", "gross_errors"), "change the rows of positions.csv"
+        ),
         "hold": "campaigns have no slopes within holds",
         "no_time": "`interval` is none then",
         "robot_sigma_mgon": "`robot_sigma` takes it with its unit, as 5mgon",
         "samples_per_hold": "`n_samples` takes it",
-        "sigma_angle": "`robot_sigma` takes it",
         "sigma_unknown": "`sigma_known` says it, as --no-sigma-known",
     },
 }
