@@ -34,7 +34,6 @@ from accelstudy.campaign.importing.windows import (
     usual_window,
     windows_at_rest,
 )
-from accelstudy.leveling.angles import usual_norm
 
 MAX_SATURATED_SHARE = 0.05
 """A hold is useless if more than this share of its samples is at the end of the scale."""
@@ -86,11 +85,6 @@ class Holds:
     def means(self) -> Array:
         """Mean specific forces, (n, 3), m/s²."""
         return self.table[[*AXES]].to_numpy()
-
-    @property
-    def radius(self) -> float:
-        """Usual distance of the means from the zero point of the specific forces, m/s²."""
-        return usual_norm(self.means - self.noise.center)
 
     @property
     def used(self) -> NDArray[np.bool_]:
@@ -339,7 +333,7 @@ def _moves(holds: Holds, records: Sequence[Array]) -> bool:
     may be larger, but it is quick and averages out like white noise. A human body moves slowly.
     """
     floor = holds.windows.floor
-    if not floor > MAX_REST_NOISE * min(holds.radius, STANDARD_GRAVITY):
+    if not floor > MAX_REST_NOISE * STANDARD_GRAVITY:
         return False
     curve = pooled_deviation(records, holds.log.step)
     reliable = (curve.differences >= MIN_DIFFERENCES) & (curve.tau >= QUICK_RATIO)

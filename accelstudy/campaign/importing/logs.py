@@ -24,6 +24,7 @@ from accelstudy.campaign.importing.settings import ImportSettings
 from accelstudy.campaign.importing.windows import usual_window
 from accelstudy.campaign.session import Campaign
 from accelstudy.campaign.table import format_columns, parse_holds
+from accelstudy.leveling.angles import usual_norm
 
 if TYPE_CHECKING:
     from accelstudy.campaign.reference_log import ReferenceLog
@@ -197,7 +198,7 @@ def _with_offset(holds: Holds) -> Holds:
     log, center = holds.log, holds.noise.center
     layout, scale = log.layout, log.layout.conversion.scale
     unknown = (layout.unit, layout.offset) == ("counts", None) and holds.noise.directed
-    if not unknown or np.linalg.norm(center) <= holds.radius / 2:
+    if not unknown or np.linalg.norm(center) <= usual_norm(holds.means - center) / 2:
         return holds
     counts = np.round(layout.axes.from_frd(center) / scale)
     zero, samples, table = layout.axes.to_frd(counts * scale), log.samples, holds.table.copy()

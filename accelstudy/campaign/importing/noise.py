@@ -35,8 +35,6 @@ LONGEST_RECORD = 2**20
 """Samples of a hold that are used for the Allan deviation; later ones count for the mean only."""
 MAX_READINGS = 2**15
 """Different readings of an axis beyond which its steps are too fine to matter."""
-MIN_REPEATS = 4
-"""Times that a reading occurs on average, at least, where an axis is read in steps."""
 MAX_STEP = 0.1 * STANDARD_GRAVITY
 """Largest step of a usable sensor, m/s²."""
 _OFF = 0.1
@@ -174,8 +172,7 @@ def step_in(readings: Array) -> float:
         different = np.union1d(different, readings[first : first + MAX_READINGS])
         if len(different) > MAX_READINGS:
             return 0.0
-    often = len(readings) >= MIN_REPEATS * len(different)
-    return float(f"{step_of(different):.6g}") if often else 0.0
+    return float(f"{step_of(different):.6g}")
 
 
 def step_of(different: Array) -> float:
