@@ -218,6 +218,15 @@ def test_rows_of_several_sensors_are_refused(name):
         assert acs.find_holds(one).n_positions == HOLDS
 
 
+def test_a_rate_that_the_times_contradict_is_told():
+    dated = table(time=START + pd.to_timedelta(TIME, "s"))
+    named = table(names=("t_ms", "ax", "ay", "az"), time=1e3 * TIME)
+    for frame, name in ((dated, "t"), (named, "t_ms")):
+        wrong, right = (acs.find_holds(frame, rate=rate) for rate in (60, HAND_RATE))
+        assert f"column {name} tells 50 samples per second, and `rate` 60 was taken" in said(wrong)
+        assert "samples per second, and" not in said(right)
+
+
 def test_gravity_is_told_and_is_that_of_the_earth():
     usual, typed = acs.find_holds(table()), acs.find_holds(table(), gravity=9.08795)
     assert "gravity: 9.80665 m/s², as none was given" in usual.notes
@@ -427,10 +436,12 @@ def test_a_table_of_means_is_told_with_what_it_lacks(tmp_path):
     """Exact names count before letters that mean an axis, too."""
     means = FORCES.reshape(HOLDS, -1, 3)[:, 50:].mean(axis=1)
     columns = dict(zip(("fx", "fy", "fz", "x", "y", "z"), (*means.T, *means.T), strict=True))
-    frame = pd.DataFrame({"t": 20 * np.arange(HOLDS), **columns, "roll": 0.0, "pitch": 0.0})
+    frame = pd.DataFrame({"t": 6e4 * np.arange(HOLDS), **columns, "roll": 0.0, "pitch": 0.0})
     frame[["roll", "pitch"]] = angles_of(means) / GON
     campaign = acs.find_holds(frame, means=True, time="t", robot_sigma="3 mgon", frame="frd")
     assert "forces in m/s^2, angles in gon, axes frd; not used: x, y, z" in said(campaign)
     assert "without the robot's yaw" in said(campaign)
-    campaign = acs.find_holds(frame.assign(yaw=0.0), means=True, time="t", robot_sigma="3 mgon")
+    assert "h apart on average; is `time_unit` s right?" in said(campaign)
+    frame = frame.assign(t=20 * np.arange(HOLDS), yaw=0.0)
+    campaign = acs.find_holds(frame, means=True, time="t", robot_sigma="3 mgon")
     assert campaign.warnings == ()

@@ -161,14 +161,16 @@ def _find_places(
     raw: RawTable, columns: Mapping[str, Place], said: Collection[str], wanted: Collection[str]
 ) -> dict[str, int]:
     """Places of the columns of a log; those of another log of the sensor may be missing."""
-    if len(raw.names) == 3 and not any(_find(raw, k, columns.get(k)) is not None for k in AXES):
+    if len(raw.names) == 3 and not any(
+        find_column(raw, k, columns.get(k)) is not None for k in AXES
+    ):
         columns = {**columns, **dict(zip(AXES, range(3), strict=True))}
     places: dict[str, int] = {}
     for key in wanted:
         if key in CONDITIONS and columns.get(key) == NONE:
             continue
         try:
-            place = _find(raw, key, columns.get(key))
+            place = find_column(raw, key, columns.get(key))
         except InputError:
             if key in said or key in AXES:
                 raise
@@ -196,7 +198,7 @@ def which_column(raw: RawTable, key: str) -> str:
     return f"{raw.path}: which column is {key}? The columns are {there}, counted from 0"
 
 
-def _find(raw: RawTable, key: str, column: Place | None = None) -> int | None:
+def find_column(raw: RawTable, key: str, column: Place | None = None) -> int | None:
     """Place of the column of a key: as given, or by its usual names; None if no name tells it.
 
     Digits are a place, unless a column has them as its name.

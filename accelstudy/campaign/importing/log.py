@@ -26,7 +26,9 @@ from accelstudy.campaign.importing.columns import (
     CONDITIONS,
     MEANS,
     NONE,
+    find_column,
     resolve_layout,
+    unit_in,
     which_column,
 )
 from accelstudy.campaign.importing.formats import read_table, table_in_memory
@@ -43,6 +45,9 @@ MAX_NAMED = 3
 """Rows that are named of those left out."""
 GAP_RATIO = 5.0
 """A step of time that is this many times the usual one is a gap."""
+MAX_RATE_ERROR = 0.05
+"""Relative difference between a given rate and that of a column of time from which on a warning
+says so."""
 CLOCK_ENDS = (2**32, 86_400 * 10**9)
 """Ticks after which a clock begins anew: a counter of 32 bits, and a time of day in ns."""
 _USUAL_RATE = 100.0
@@ -157,7 +162,7 @@ class Log:
         """What could not be read."""
         if self.parts:
             return [line for part in self.parts for line in part.warnings()]
-        said = [*self.raw.warnings]
+        said = [*self.raw.warnings, *self._contradicted_rate()]
         if self.wrap is not None:
             where = self.describe(self.wrap, "time")
             said.append(f"the clock wraps around, and is counted on: {where}")
@@ -170,6 +175,23 @@ class Log:
                 f"or absurd: {each}{more}"
             )
         return said
+
+    def _contradicted_rate(self) -> list[str]:
+        """Say that times of a known unit tell another rate than the one that was given."""
+        raw, rate = self.raw, self.layout.rate
+        place = None if rate is None else find_column(raw, "time")
+        if rate is None or place is None:
+            return []
+        unit = "ns" if place in raw.dates else unit_in(raw.names[place], "time")
+        if unit is None:
+            return []
+        layout = self.layout.model_copy(update={"time_unit": unit})
+        ticks, tick = _ticks(raw, layout, {"time": place})
+        step = tick * float(np.median(np.diff(ticks)))
+        if step <= 0 or abs(step * rate - 1) <= MAX_RATE_ERROR:
+            return []
+        told = f"{1 / step:.6g} samples per second"
+        return [f"column {raw.names[place]} tells {told}, and `rate` {rate:g} was taken"]
 
     # --- what holds are looked for in ------------------------------------------------------------
 

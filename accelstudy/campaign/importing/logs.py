@@ -35,6 +35,8 @@ Imported = tuple[Campaign, Holds | None]
 MAX_ACROSS_RATIO = 1.5
 """Noise across gravity, as a multiple of that along it, from which on a warning says that the
 sensor turns within its holds."""
+LONGEST_STEP = 3600.0
+"""s between the rows of a table of means, on average, from which on its unit of time is doubted."""
 _YEARS = 1e8  # s; no session lasts for years, so later times count from 1970
 _ON_EARTH = 9.76, 9.84
 """Gravity, m/s², with some room: from the highest mountain on the equator to the poles."""
@@ -173,6 +175,11 @@ def _campaign_of_means(log: Log, settings: ImportSettings) -> Campaign:
         warnings.append(
             "without the robot's yaw a base that is not level looks like noise; a column yaw, or "
             "`columns` yaw=NAME, tells it"
+        )
+    if "time" in rows and (step := float(np.ptp(rows["time"])) / len(rows)) > LONGEST_STEP:
+        unit = log.layout.time_unit
+        warnings.append(
+            f"rows are {step / 3600:.3g} h apart on average; is `time_unit` {unit} right?"
         )
     shown = "unknown" if sigma is None else sigma_text(sigma)
     notes = (_columns_note(log, settings), f"{len(rows)} positions; sigma of a mean: {shown}")
