@@ -126,7 +126,9 @@ def judged(job):
     case = asked.case
     truths = [truth for _, truth in made]
     model, by = get_model(MODEL), get_approach(case.approach)
-    lot = weigh_lot([Sensor(one, model, by, 1 + i) for i, (one, _) in enumerate(made)])
+    draws = np.random.SeedSequence(1).spawn(len(made))
+    each = zip(made, draws, strict=True)
+    lot = weigh_lot([Sensor(one, model, by, own) for (one, _), own in each])
     classes = {}
     for truth in truths if kind.named else ():
         for effect, same in zip(truth.effects, truth.classes, strict=True):

@@ -73,14 +73,14 @@ class Sensor:
     campaign : Campaign
     model : SensorModel
     approach : Approach
-    seed : int, of the draws
+    seed : SeedSequence, of the draws
     noise : NoisePrior, in place of what the campaign says of its noise
     """
 
     campaign: Campaign
     model: SensorModel
     approach: Approach
-    seed: int = 1
+    seed: np.random.SeedSequence
     noise: NoisePrior | None = None
 
     def fit(self) -> BaseFit:
@@ -102,7 +102,7 @@ class Sensor:
         A campaign that does not determine the model says nothing of what else is missing.
         """
         try:
-            problem = pose(self.fit(), np.random.SeedSequence(self.seed))
+            problem = pose(self.fit(), self.seed)
         except InputError:
             return SensorEvidence(self.campaign.name)
         by_level, z = problem.noise_density, problem.residuals.z

@@ -8,6 +8,7 @@ from functools import cached_property
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pandas as pd
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
@@ -97,14 +98,15 @@ class Lot(Result):
         """
         usable, left_out, first = list[Sensor](), dict[str, str](), dict[bytes, str]()
         names = distinct([campaign.name for campaign in campaigns])
-        for unnamed, own in zip(campaigns, names, strict=True):
+        seeds = np.random.SeedSequence(seed).spawn(len(names))
+        for unnamed, own, draws in zip(campaigns, names, seeds, strict=True):
             campaign = unnamed.with_header(name=own)
             # Noise never repeats: the same numbers are the same log, whatever its folder.
             if (same := first.setdefault(campaign.forces.tobytes(), own)) != own:
                 left_out[own] = f"has the readings of {same}; each sensor counts once"
                 continue
             by = approach or usual_approach(campaign)
-            sensor = Sensor(campaign, model, by, seed + len(usable))
+            sensor = Sensor(campaign, model, by, draws)
             try:
                 sensor.fit()
                 usable.append(sensor)
