@@ -23,8 +23,9 @@ from accelstudy.epochs.course import YEAR
 from accelstudy.epochs.file_format import HistoryDocument
 
 MIN_GAIN = 2.71
-"""Gain in deviance from which on a kind of noise is there: χ² of a one-sided 5 %, of which white
-noise shows a random walk in 5 % of logs and a bias instability in 10 %."""
+"""Gain in deviance from which on a kind of noise is there, or the shortest averaging time is left
+out: χ² of a one-sided 5 %, of which white noise shows a random walk in 5 % of logs and a bias
+instability in 10 %."""
 INDEPENDENT_SHARE = 3 / 8
 """Values of an Allan deviation within two octaves, eight of them, count as three."""
 MAX_STEPS = 50
@@ -48,12 +49,14 @@ def sheet_of_allan(curve: AllanDeviation, name: str, source: str) -> DataSheet:
     """Fit σ²(τ) = N²/τ + (0.664 B)² + K²τ/3 to an Allan deviation.
 
     None of the three is negative, and B and K are there only if they explain the curve better than
-    chance would. A variance with ν degrees of freedom has a gamma distribution.
+    chance would. At the shortest averaging times a low-pass filter of the sensor makes noise less;
+    as many are left out as differ from the others by more than chance. A variance with ν degrees of
+    freedom has a gamma distribution.
 
     Raises
     ------
     InputError
-        If there are too few values.
+        If there are too few values, or none shows white noise.
     """
     usable = (curve.differences >= MIN_DIFFERENCES) & (curve.pooled > 0)
     if np.count_nonzero(usable) < 3:
@@ -62,17 +65,25 @@ def sheet_of_allan(curve: AllanDeviation, name: str, source: str) -> DataSheet:
     dof = INDEPENDENT_SHARE * curve.deviation.shape[1] * curve.differences[usable]
     kinds = np.column_stack([1 / tau, np.ones_like(tau), tau])
 
-    def fit(chosen: tuple[int, ...]) -> tuple[float, Array]:
-        """Deviance with a penalty for each kind of noise chosen, and the squares of all sizes."""
-        squares, expected = np.zeros(3), variance
+    def fit(first: int, chosen: tuple[int, ...]) -> tuple[float, Array]:
+        """Deviance with penalties for what is chosen and left out, and squares of all sizes."""
+        squares, expected = np.zeros(3), variance[first:]
         for _ in range(MAX_STEPS):
-            weight = np.sqrt(dof) / expected
-            squares[[*chosen]], _ = nnls(kinds[:, chosen] * weight[:, None], variance * weight)
-            expected = kinds @ squares
-        deviance = np.sum(dof * (np.log(expected) + variance / expected))
-        return float(deviance) + MIN_GAIN * len(chosen), squares
+            weight = np.sqrt(dof[first:]) / expected
+            weighted = kinds[first:, chosen] * weight[:, None]
+            squares[[*chosen]], _ = nnls(weighted, variance[first:] * weight)
+            expected = kinds[first:] @ squares
+        ratio = variance[first:] / expected
+        deviance = np.sum(dof[first:] * (ratio - 1 - np.log(ratio)))
+        return float(deviance) + MIN_GAIN * (len(chosen) + first), squares
 
-    _, (n, b, k) = min(map(fit, [(0,), (0, 1), (0, 2), (0, 1, 2)]), key=itemgetter(0))
+    best = math.inf, np.zeros(3)
+    for first in range(len(tau) - 2):
+        if MIN_GAIN * first > best[0]:
+            break
+        each = [fit(first, chosen) for chosen in ((0,), (0, 1), (0, 2), (0, 1, 2))]
+        best = min(best, *each, key=itemgetter(0))
+    n, b, k = best[1]
     if n == 0:
         raise InputError(f"{source}: no white noise in its Allan deviation; is it filtered?")
     values: dict[str, Any] = {

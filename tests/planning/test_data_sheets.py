@@ -6,6 +6,7 @@ import math
 import numpy as np
 import pytest
 from calling import refusal, succeed
+from scipy import signal
 
 from accelstudy.basics.units import STANDARD_GRAVITY
 from accelstudy.campaign.importing.allan import pooled_deviation
@@ -150,6 +151,17 @@ def test_white_noise_seldom_shows_another_and_a_random_walk_is_seen():
     for count in (flicker.sum(), drift.sum()):
         assert count <= 60 * 0.1 + 3 * np.sqrt(60 * 0.1 * 0.9)
     assert found.mean() == pytest.approx(walk, abs=3 * found.std() / 60**0.5 + 0.05 * walk)
+
+
+@pytest.mark.parametrize("corner", [0.05, 0.3, 0.5, 0.7])
+def test_a_filter_of_the_sensor_hides_no_white_noise(corner):
+    """Of a bandwidth in parts of half the rate; without a bias instability of that size."""
+    rng, step = np.random.default_rng(4), 0.01
+    white = rng.standard_normal((60_000, 3)) / step**0.5
+    filtered = signal.lfilter(*signal.butter(2, corner), white, axis=0)
+    sheet = sheet_of_allan(pooled_deviation([filtered], step), "s", "s")
+    assert sheet.velocity_random_walk == pytest.approx(1.0, rel=0.1)
+    assert sheet.sigma_mean(10.0) == pytest.approx(1 / 10**0.5, rel=0.1)
 
 
 def test_a_log_at_rest_makes_a_data_sheet_that_can_be_read(still_log, tmp_path):
