@@ -57,6 +57,7 @@ AROUND = {
     "note below": ([*ROWS, "", "End of recording, 26 positions, all is well, N. N."], "1 of"),
     "header again": ([*ROWS[:700], ROWS[0], *ROWS[700:900], *ROWS[0:1], *ROWS[900:]],
                      "header stands 2 more times"),
+    "comma behind the names": ([ROWS[0] + ",", *ROWS[1:]], "forces from ax, ay, az"),
     "units": ([ROWS[0], "s,m/s²,m/s²,m/s²", *ROWS[1:]], "units: in line 2"),
     "units in mg": ([ROWS[0], "s,mg,mg,mg", *rows_of(table(forces=FORCES * 1e3 / G))[1:]], "(mg)"),
     "first row": ([ROWS[0], "0.0,,,", *ROWS[2:]], "line 2, column ax (fx): nothing"),

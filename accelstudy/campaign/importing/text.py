@@ -180,6 +180,8 @@ class _Rows:
     def _take_names(self, names: list[str], units: Sequence[str]) -> bool:
         """Take names, with units behind them, if there is one for each column."""
         longest = max(map(len, self._sample))
+        while len(names) > longest and not names[-1]:
+            names = names[:-1]
         empty = all(row[len(names) :][:1] == [""] for row in self._sample)
         if len(names) == self.width - 1 and empty:
             self.width = len(names)
