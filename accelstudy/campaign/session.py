@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+import pandas as pd
 from numpy.typing import NDArray
 
 from accelstudy.basics.arrays import CachedTable
@@ -213,16 +214,15 @@ class Campaign:
         arrays : by the names of the attributes, such as `forces` and `time`, in SI; None leaves
             the columns out
         """
-        holds = self.holds
+        columns = {name: column.to_numpy() for name, column in self.holds.items()}
         for attribute, values in arrays.items():
-            names = [*COLUMNS[attribute].names]
-            columns = holds.reindex(columns=names)
-            holds = holds.drop(columns=names, errors="ignore")
+            before = {name: columns.pop(name, np.nan) for name in COLUMNS[attribute].names}
             if values is not None:
-                changed = split(attribute, values, self.n_positions)
-                columns.loc[self.used] = np.column_stack([*changed.values()])
-                holds = holds.join(columns)
-        return replace(self, holds=holds)
+                for name, column in split(attribute, values, self.n_positions).items():
+                    own = before[name]
+                    columns[name] = np.full(len(self.used), own, np.result_type(own, column))
+                    columns[name][self.used] = column
+        return replace(self, holds=pd.DataFrame(columns, self.holds.index))
 
     def with_sigma(self, sigma_force: float | None) -> Campaign:
         """Return the campaign with a noise of a position mean, m/s², that is known; None is not."""
