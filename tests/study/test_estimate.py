@@ -198,3 +198,11 @@ def test_few_controlled_replicates_say_what_many_plain_ones_do(noise, approach, 
     for name in ("roll", "pitch", "both"):
         one, other = few.quantile(TILT, name, 0.95), many.quantile(TILT, name, 0.95)
         assert abs(one.value - other.value) < limit * np.hypot(one.error, other.error)
+
+
+def test_few_replicates_have_no_control():
+    """A coefficient of a handful of replicates would fit them."""
+    few = simulated_statistics(cell_of(replicates=19), 1)
+    assert few.control == "none"
+    assert (few["sd"].gain == 1).all()
+    assert np.isnan(few.quantile(TILT, "both", 0.5).error)
