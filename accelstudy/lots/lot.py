@@ -22,7 +22,7 @@ from accelstudy.diagnosis.decision.problem import BaseFit
 from accelstudy.lots.evidence import Sensor, SensorEvidence
 from accelstudy.lots.file_format import Alternative, OddSensor, SensorState
 from accelstudy.lots.noise import NoisePrior, noises_of_lot
-from accelstudy.lots.passes import LEVEL, MIN_HAVING, LotEffect, Mapped, Pass, called_odd
+from accelstudy.lots.passes import LEVEL, MIN_HAVING, LotEffect, Mapped, Pass, find_odd
 from accelstudy.sensors.models import get_model
 from accelstudy.sensors.sensor import SensorModel
 
@@ -109,7 +109,7 @@ class LotDiagnosis:
                 by_size=True,
             )
             for one in self.effects
-            for i in called_odd(one.other_size)
+            for i in find_odd(one.other_size)
         }
         every = {**by_size, **self.last.odd}
         return dict(sorted(every.items(), key=lambda item: -round(item[1].posterior, 3)))

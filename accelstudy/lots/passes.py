@@ -267,7 +267,7 @@ class Pass:
         *having, odd = self.mixture.sensors
         each = dict(zip(self.mixture.effects, having, strict=True))
         unnamed = sum((each[name] for name in each if name not in self._named), odd)
-        if len(called_odd(np.asarray(unnamed))) <= self._few:
+        if len(find_odd(np.asarray(unnamed))) <= self._few:
             return np.asarray(unnamed)
         return np.asarray(sum((each[name] for name in self._rare), odd))
 
@@ -282,7 +282,7 @@ class Pass:
         names = [name for name in self.mixture.own if name not in self._named]
         own = np.array([self.mixture.own[n] + np.log(self.mixture.prior[n]) for n in names])
         odd = dict[int, OddSensor]()
-        for i in called_odd(self.posterior_odd):
+        for i in find_odd(self.posterior_odd):
             shares = special.softmax(own[:, i])
             first = np.argsort(-shares, kind="stable")
             first = first[: _count_certain(shares[first])]
@@ -295,10 +295,12 @@ class Pass:
         return odd
 
 
-def called_odd(posterior: Array) -> list[int]:
-    """Numbers of the sensors that are called odd, the surest first, so that few are so wrongly.
+def find_odd(posterior: Array) -> list[int]:
+    """Return the numbers of odd sensors, the surest first, so many that few are wrong.
 
-    posterior : (n,) array, of each sensor to be odd
+    Parameters
+    ----------
+    posterior : (n,) array, probability of each sensor to be odd
     """
     # Sensors of which nobody doubts it stay in their order.
     order = np.argsort(-np.round(posterior, 3), kind="stable")
