@@ -95,10 +95,18 @@ class Campaign:
         content = {"schema_version": 1, "unit": "m/s^2", **content}
         header = validate(Header, content, content.get("name", "campaign"))
         campaign = cls(header, table_of(arrays))
-        if check:
-            columns = format_columns(campaign.holds, header)
-            campaign = cls(header, parse_holds(columns, header, Path("campaign")))
-        return campaign.without_excluded()
+        return (campaign.check_holds(Path("campaign")) if check else campaign).without_excluded()
+
+    def check_holds(self, path: Path) -> Campaign:
+        """Return the campaign with its holds as the file of a campaign would give them.
+
+        Raises
+        ------
+        InputError
+            If a value cannot be right; the line begins with `path`.
+        """
+        columns = format_columns(self.holds, self.header)
+        return replace(self, holds=parse_holds(columns, self.header, path))
 
     def __repr__(self) -> str:
         return f"Campaign({self.name!r}, {plural(self.n_positions, 'position')})"

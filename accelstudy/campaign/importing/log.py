@@ -185,8 +185,7 @@ class Log:
         unit = "ns" if place in raw.dates else unit_in(raw.names[place], "time")
         if unit is None:
             return []
-        layout = self.layout.model_copy(update={"time_unit": unit})
-        ticks, tick = _ticks(raw, layout, {"time": place})
+        ticks, tick = _ticks(raw, unit, {"time": place})
         step = tick * float(np.median(np.diff(ticks)))
         if step <= 0 or abs(step * rate - 1) <= MAX_RATE_ERROR:
             return []
@@ -338,13 +337,13 @@ def read_log(
 def _convert(
     raw: RawTable, layout: LogLayout, places: Mapping[str, int]
 ) -> tuple[pd.DataFrame, float, float, int | None]:
-    """Convert the columns of a log to SI, with the unit, the first and a break of its times."""
+    """Convert the columns of a log to SI; also `tick`, `start` and `wrap` of the `Log`."""
     conditions = [key for key in places if key in CONDITIONS]
     tick, start, wrap, count = 1.0, np.nan, None, len(raw.content)
     columns = ["time", *AXES, *conditions]
     values = np.empty((len(columns), count))
     if "time" in places:
-        ticks, tick = _ticks(raw, layout, places)
+        ticks, tick = _ticks(raw, layout.time_unit, places)
         ticks, start = _counted_from_first(ticks)
         ticks, wrap = _count_on(ticks)
         start *= tick
@@ -368,15 +367,13 @@ def _convert(
     return pd.DataFrame(values.T, columns=columns, copy=False), tick, start, wrap
 
 
-def _ticks(
-    raw: RawTable, layout: LogLayout, places: Mapping[str, int]
-) -> tuple[NDArray[Any], float]:
-    """Times of a log, (n,), in its unit, and this unit, s; dates and stamps of ROS in ns."""
+def _ticks(raw: RawTable, unit: str, places: Mapping[str, int]) -> tuple[NDArray[Any], float]:
+    """Times of a log, (n,), in ticks, and a tick, s: a unit, or 1 ns of dates and stamps of ROS."""
     if places["time"] in raw.dates:
         return raw.nanoseconds(places["time"]), 1e-9
     times = raw.numbers(places["time"])
     if "nanoseconds" not in places:
-        return times, UNITS["s"][layout.time_unit]
+        return times, UNITS["s"][unit]
     seconds = times.astype(np.int64) if times.dtype.kind in "iu" else times
     return seconds * 10**9 + raw.numbers(places["nanoseconds"]), 1e-9
 
@@ -419,14 +416,14 @@ def join(logs: Sequence[Log]) -> Log:
         if shift:
             samples[i] = samples[i].assign(time=samples[i]["time"] + shift)
         end = samples[i]["time"].iloc[-1] + joined.step
+    whole = pd.concat(samples, join="inner") if samples[1:] else samples[0]
+    joined = replace(joined, samples=whole)
     # In a single position, a channel of a coarse sensor may be constant.
-    constant = np.ptp(samples[0].iloc[:, 1:4].to_numpy(), axis=0) == 0
-    if len(logs) == 1 and constant.any():
+    if len(logs) == 1 and (constant := np.ptp(joined.forces, axis=0) == 0).any():
         axis = AXES[min(first.layout.axes.order[constant])]
         name = first.raw.names[first.places[axis]]
         raise InputError(f"{first.path}: column {name} ({axis}) is constant")
-    whole = pd.concat(samples, join="inner") if samples[1:] else samples[0]
-    return replace(joined, samples=whole)
+    return joined
 
 
 def _counted_from_first(values: NDArray[Any]) -> tuple[Array, float]:

@@ -23,7 +23,6 @@ from accelstudy.campaign.importing.noise import sigma_text, steps_text
 from accelstudy.campaign.importing.settings import ImportSettings
 from accelstudy.campaign.importing.windows import usual_window
 from accelstudy.campaign.session import Campaign
-from accelstudy.campaign.table import format_columns, parse_holds
 from accelstudy.leveling.angles import usual_norm
 
 if TYPE_CHECKING:
@@ -201,7 +200,10 @@ def _columns_note(log: Log, settings: ImportSettings) -> str:
 
 
 def _with_offset(holds: Holds) -> Holds:
-    """Holds of counts with an offset from the positions, unless it is given, or a bias alone."""
+    """Take an unknown offset of counts, as the positions tell it, off a log and its holds.
+
+    A center that is near zero is the bias of the sensor, and no offset.
+    """
     log, center = holds.log, holds.noise.center
     layout, scale = log.layout, log.layout.conversion.scale
     unknown = (layout.unit, layout.offset) == ("counts", None) and holds.noise.directed
@@ -285,9 +287,8 @@ def _checked(campaign: Campaign, log: Log, settings: ImportSettings) -> Campaign
             f"a gravity of {campaign.gravity:.9g} m/s² is that of no place on Earth, from {least} "
             f"to {most}; check `gravity`"
         )
-    holds = parse_holds(format_columns(campaign.holds, campaign.header), campaign.header, log.path)
     notes, warnings = (*campaign.notes, note), (*campaign.warnings, *doubts)
-    return replace(campaign, holds=holds, notes=notes, warnings=warnings)
+    return replace(campaign.check_holds(log.path), notes=notes, warnings=warnings)
 
 
 # --- What is said of it --------------------------------------------------------------------------
