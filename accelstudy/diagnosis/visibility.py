@@ -171,7 +171,7 @@ def visibility_table(frame: SessionFit) -> pd.DataFrame:
     rows = []
     for row in visibilities(frame):
         effect, seen = get_effect(row.name), row.status == "visible"
-        unit = effect.parameters[0].unit
+        unit = effect.unit
         near = ", ".join(f"{name} {cosine:.2f}" for name, cosine in row.confused)
         rows.append(
             {

@@ -108,6 +108,11 @@ class Effect(WithSettings):
         return self.part == "sensor" and (self.family in COURSES or self.sudden)
 
     @property
+    def unit(self) -> str:
+        """SI unit of the parameters, and so of `typical`."""
+        return self.parameters[0].unit
+
+    @property
     def equation(self) -> str:
         """Formula of the effect, for people."""
         output, axes, reading = expressions(self)

@@ -39,7 +39,7 @@ def part_lines(part: str, plan: Plan) -> list[str]:
 def assumed_sizes(question: Question) -> list[str]:
     """Effects that are taken to have a usual size, as nothing is known of it, in words."""
     sizes = {
-        effect: quantity_text(question.sizes[effect], get_effect(effect).parameters[0].unit)
+        effect: quantity_text(question.sizes[effect], get_effect(effect).unit)
         for effect in question.assumed
     }
     return [f"{words(effect)} ({size})" for effect, size in sizes.items()]

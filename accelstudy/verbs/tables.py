@@ -52,7 +52,7 @@ def _effect(item: Effect | NoiseEffect) -> Row:
     ]
     if isinstance(item, Effect):
         columns = compose(item.spec, (item.spec,)).hold_columns
-        unit, ends = item.parameters[0].unit, item.typical
+        unit, ends = item.unit, item.typical
         row |= {
             "part": item.part,
             "parameters": ", ".join(parameter.name for parameter in item.parameters),
