@@ -266,9 +266,9 @@ class Pass:
         """
         *having, odd = self.mixture.sensors
         each = dict(zip(self.mixture.effects, having, strict=True))
-        unnamed = sum((each[name] for name in each if name not in self._named), odd)
-        if len(find_odd(np.asarray(unnamed))) <= self._few:
-            return np.asarray(unnamed)
+        unnamed = np.asarray(sum((each[name] for name in each if name not in self._named), odd))
+        if len(find_odd(unnamed)) <= self._few:
+            return unnamed
         return np.asarray(sum((each[name] for name in self._rare), odd))
 
     @property

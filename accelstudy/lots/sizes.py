@@ -165,7 +165,7 @@ class LotResiduals:
 
     @cached_property
     def p_values_of_pattern(self) -> list[float]:
-        """Probability that noise alone has as much in common, residual by residual; [] without it.
+        """P-value of what residuals have in common, one by one; none if the positions differ.
 
         It shows what no name explains, in sensors that were in the same positions and conditions;
         in other ones, it shows nothing. Residuals are taken as in `shown`.
