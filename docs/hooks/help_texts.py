@@ -4,24 +4,18 @@ import click
 from markdown_text import page, table
 
 from accelstudy import pages
-from accelstudy.commands.main import SECTIONS, main
-
-WIDTH = 100
-"""Of the help, letters."""
+from accelstudy.commands.main import main
 
 
 def commands():
     """Help of accelstudy, and of all commands in its order."""
-    top = click.Context(main, info_name="accelstudy", terminal_width=WIDTH)
-    parts = [_help(main, top)]
-    for command in (command for section in SECTIONS.values() for command in section):
-        context = click.Context(command, info_name=command.name, parent=top, terminal_width=WIDTH)
-        parts += [f"## {command.name}", _help(command, context)]
-    return page(*parts)
+    top = click.Context(main, info_name="accelstudy", terminal_width=100)
+    each = (click.Context(command, top, name) for name, command in main.commands.items())
+    return page(_help(top), *(page(f"## {one.info_name}", _help(one)) for one in each))
 
 
-def _help(command, context):
-    return f"```text\n{command.get_help(context)}\n```"
+def _help(context):
+    return f"```text\n{context.get_help()}\n```"
 
 
 def terms():

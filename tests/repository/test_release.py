@@ -52,18 +52,6 @@ def test_the_environment_file_names_this_version():
     assert f"{python.partition('=')[2]}.0" in SpecifierSet(PROJECT["requires-python"])
 
 
-def test_make_targets_and_files_of_the_readme_exist():
-    """Those of the other pages are checked when the site is built."""
-    text = (ROOT / "README.md").read_text(encoding="utf-8")
-    makefile = (ROOT / "Makefile").read_text(encoding="utf-8")
-    targets = set(re.findall(r"(?:^ *|`)make ([a-z-]+)", text, re.M)) - {"help"}
-    assert {"reproduce", "docs"} <= targets
-    for target in targets:
-        assert re.search(rf"^{target}:", makefile, re.M), target
-    for name in re.findall(r"[`(]((?:config|benchmarks|docs|accelstudy)/[\w/.-]+)[`)]", text):
-        assert (ROOT / name).exists(), name
-
-
 def test_each_page_that_the_readme_names_can_be_clicked():
     text = re.sub(r"```.*?```", "", (ROOT / "README.md").read_text("utf-8"), flags=re.DOTALL)
     links = re.findall(r"\]\(([^)#]+)[^)]*\)", text)

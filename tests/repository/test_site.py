@@ -1,6 +1,6 @@
 """What the documentation says of files is what studies, calibrations and batches write.
 
-`make docs` checks the rest: links, anchors, and the files, commands and options that pages name.
+`make docs` checks links and anchors, test_pages.py the names that pages use.
 """
 
 import inspect
