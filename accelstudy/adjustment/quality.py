@@ -607,7 +607,7 @@ def _leveling_slope(solution: Solution) -> Array:
 
 
 @dataclass(frozen=True)
-class HeldOut:
+class HeldOutErrors:
     """How well each position is predicted by a calibration from all others.
 
     Attributes
@@ -642,7 +642,7 @@ def _rms(values: Array) -> float:
     return float(np.sqrt(np.mean(predicted**2))) if len(predicted) else np.nan
 
 
-def held_out(solution: Solution) -> HeldOut | None:
+def held_out(solution: Solution) -> HeldOutErrors | None:
     """Predict each position of a session by all others; None if the redundancy is below c.
 
     Without position i the parameters change by dx = Q_xx Ãᵢᵀ R_ii⁻¹ e_i, and its misclosure becomes
@@ -657,7 +657,7 @@ def held_out(solution: Solution) -> HeldOut | None:
     scaled = root @ np.swapaxes(root, 1, 2) @ solution.errors[: n * c].reshape(n, c, 1)
     misclosures = (solution.whitening @ scaled)[..., 0]
     if observed.angles is None or not solution.approach.uses_angles:
-        return HeldOut(misclosures, None)
+        return HeldOutErrors(misclosures, None)
     design = solution.design[: n * c].reshape(n, c, -1)
     x = solution.parameters + (np.swapaxes(design, 1, 2) @ scaled)[..., 0] @ solution.cofactors
     p = x[:, : model.n_parameters]
@@ -667,7 +667,7 @@ def held_out(solution: Solution) -> HeldOut | None:
     f_b = model.correct(observed.forces[0][:, None], p, g, hold)[:, 0]
     readings = observed.angles[0]
     attitude = readings - model.errors_of_reading(readings[:, None], p, hold)[:, 0]
-    return HeldOut(misclosures, _attitude_error(f_b, attitude))
+    return HeldOutErrors(misclosures, _attitude_error(f_b, attitude))
 
 
 def _attitude_error(f: Array, angles: Array) -> Array:

@@ -136,7 +136,7 @@ class Estimate(Part):
         return cls(name=quantity.name, value=value, sigma=sigma, unit=quantity.unit)
 
 
-class Certain(Part):
+class CertainEffect(Part):
     """What is missing whatever else is open.
 
     Attributes
@@ -157,7 +157,7 @@ class Certain(Part):
     parameters: list[Estimate]
 
 
-class Found(Part):
+class FoundEffect(Part):
     """An effect, a noise effect or a gross error that was found.
 
     Attributes
@@ -253,7 +253,7 @@ class Change(Part):
     after: float | None
 
 
-class HeldOut(Change):
+class HeldOutError(Change):
     """Mean squared error of held-out positions, in units of the noise variance.
 
     Attributes
@@ -292,7 +292,7 @@ class Gap(Part):
     """
 
     sigma0_squared: Change
-    held_out_mse: HeldOut
+    held_out_mse: HeldOutError
     held_out_z: float | None
     held_out_positions: list[int]
     leveling_rms_mgon: TiltErrors
@@ -402,8 +402,8 @@ class DiagnosisDocument(Document):
     screening: Screening
     posterior: dict[str, Probability | None]
     credible_set: list[Explanation]
-    certain: Annotated[list[Certain], Field(max_length=3)]
-    effects: list[Found]
+    certain: Annotated[list[CertainEffect], Field(max_length=3)]
+    effects: list[FoundEffect]
     suspects: list[Suspect]
     shape: Shape | None
     like: list[LikelyPlace]

@@ -28,7 +28,7 @@ from accelstudy.diagnosis.evidence.noise import LEVEL, NoiseTest, worst_of
 from accelstudy.diagnosis.file_format import (
     Estimate,
     Fit,
-    Found,
+    FoundEffect,
     LikelyPlace,
     NextPosition,
     UpperLimit,
@@ -143,16 +143,16 @@ class CampaignDiagnosis:
         return self.finding.posterior.credible_set
 
     @cached_property
-    def found(self) -> tuple[Found, ...]:
+    def found(self) -> tuple[FoundEffect, ...]:
         """All that was found; of the unknown, what is certain all the same."""
         gross = () if self.recognised is None else self.recognised.names
-        named = [Found.of_name(name, at=at) for name, at in gross]
+        named = [FoundEffect.of_name(name, at=at) for name, at in gross]
         if self.finding.verdict == "noise_model":
             return (*named, self._noise())
         return (*named, *self._chosen_causes())
 
     @property
-    def effects(self) -> tuple[Found, ...]:
+    def effects(self) -> tuple[FoundEffect, ...]:
         """What the verdict names; nothing if that is unknown."""
         return () if self.verdict == "unknown" else self.found
 
@@ -162,16 +162,16 @@ class CampaignDiagnosis:
         bumped = [named.position for named in self.found if named.position is not None]
         return ~np.isin(self.campaign.positions, bumped)
 
-    def _noise(self) -> Found:
+    def _noise(self) -> FoundEffect:
         """What is wrong with the noise."""
         worst, posterior = worst_of(self.noise_tests), self.finding.posterior
         name = next(one.names[0] for one in posterior.reported if one.is_noise)
         # Of larger residuals the level says least; what they are, the evidence says.
         if worst is not None and not (worst.name == LEVEL and posterior.p_noise >= RULES.sure):
             name = worst.name
-        return Found.of_name(name, posterior.p_noise)
+        return FoundEffect.of_name(name, posterior.p_noise)
 
-    def _chosen_causes(self) -> Iterator[Found]:
+    def _chosen_causes(self) -> Iterator[FoundEffect]:
         """What was chosen, with its estimates."""
         solution, chosen = self.final.solution, self.finding.chosen
         cofactors = with_settings(self.frame, solution, [one.shape for one in chosen])
@@ -183,13 +183,13 @@ class CampaignDiagnosis:
             best, members = cause.shape, cause.members
             if best.place is not None:
                 at = int(self.campaign.positions[best.place])
-                yield Found.of_name(OUTLIER, cause.posterior, at)
+                yield FoundEffect.of_name(OUTLIER, cause.posterior, at)
                 continue
             # What is beside a large effect was found in what its refit leaves.
             (here,) = (None,) if best.name == LEARNED else self.frame.hypotheses((best.effect,))
             like = () if here is None else self.frame.imitators(here)
             searched = [s for s in best.effect.takes if s.name == best.smooth]
-            yield Found(
+            yield FoundEffect(
                 name=best.name,
                 spec=best.effect.spec,
                 position=None,

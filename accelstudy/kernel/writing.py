@@ -135,7 +135,7 @@ Rows: TypeAlias = list[list[Term]]
 
 
 def text_of(function: KernelFunction) -> str:
-    """Write the function as LLVM's text, which is kept."""
+    """Write the function as LLVM's text, which is results."""
     return cached_by_key(function.key, "kernel", lambda: _Writer(function).code.text())
 
 
@@ -190,7 +190,7 @@ class _Writer:
             for k in range(u)
         ]
         x = [Variable(code, value) for value in initial]
-        kept = _Kept.of(code, u)
+        results = _Results.of(code, u)
         numbers = code.of_integer(first) + code.lane_numbers()
         active = Variable(code, 1.0)
         with code.loop(MAX_ITERATIONS) as iteration:
@@ -198,13 +198,13 @@ class _Writer:
             going = active.get() > 0.0
             converged = going & step.within(code, tolerance)
             number = code.of_integer(code.integer("add", iteration, 1))
-            kept.iterations.set(going.select(number, kept.iterations.get()))
+            results.iterations.set(going.select(number, results.iterations.get()))
             with code.builder.if_then(converged.any()):
-                kept.keep(converged, step, x)
+                results.update(converged, step, x)
             still = going & step.finite(code) & ~converged
             active.set(still.select(1.0, 0.0))
             code.leave_unless(still.any())
-        self.results(first, kept, numbers < code.of_integer(code.arguments["replicates"]))
+        self.results(first, results, numbers < code.of_integer(code.arguments["replicates"]))
 
     def observe(self, rows: list[Any]) -> Term:
         """Take the observations into `work`; returns the tolerance of the step."""
@@ -365,21 +365,21 @@ class _Writer:
         size_v.set(size)
         self.write(i, o, v_new)
 
-    def results(self, first: Any, kept: _Kept, valid: Mask) -> None:
+    def results(self, first: Any, results: _Results, valid: Mask) -> None:
         """Write the results of a group."""
         code, u = self.code, self.u
-        lower: Rows = [[variable.get() for variable in row] for row in kept.lower]
-        pivots: list[Term] = [variable.get() for variable in kept.pivots]
-        unit = [variable.get() for variable in kept.unit]
+        lower: Rows = [[variable.get() for variable in row] for row in results.lower]
+        pivots: list[Term] = [variable.get() for variable in results.pivots]
+        unit = [variable.get() for variable in results.unit]
         q = inverse(lower, pivots)
         sigma = [root(q[k, k]) for k in range(u)]
-        rows: list[Term] = [variable.get() for variable in kept.x]
+        rows: list[Term] = [variable.get() for variable in results.x]
         rows += [s * k for s, k in zip(sigma, unit, strict=True)]
-        rows += [kept.omega.get(), kept.iterations.get(), kept.converged.get()]
+        rows += [results.omega.get(), results.iterations.get(), results.converged.get()]
         for k, value in enumerate(rows):
             row = code.integer("mul", self.stride, k)
             code.store(value, "results", code.integer("add", row, first))
-        counted = valid & (kept.converged.get() > 0.0)
+        counted = valid & (results.converged.get() > 0.0)
         reciprocal = [1.0 / s for s in sigma]
         pairs = [(j, k) for j in range(u) for k in range(j)]
         for number, (j, k) in enumerate(pairs):
@@ -409,7 +409,7 @@ class _Step:
 
 
 @dataclass(frozen=True)
-class _Kept:
+class _Results:
     """Results of the lanes."""
 
     x: list[Variable]
@@ -421,7 +421,7 @@ class _Kept:
     converged: Variable
 
     @classmethod
-    def of(cls, code: Code, u: int) -> _Kept:
+    def of(cls, code: Code, u: int) -> _Results:
         def unknown(count: int) -> list[Variable]:
             return [Variable(code, math.nan) for _ in range(count)]
 
@@ -429,7 +429,7 @@ class _Kept:
         counts = (Variable(code, 0.0) for _ in range(2))
         return cls(unknown(u), lower, unknown(u), unknown(u), *unknown(1), *counts)
 
-    def keep(self, ended: Mask, step: _Step, x: list[Variable]) -> None:
+    def update(self, ended: Mask, step: _Step, x: list[Variable]) -> None:
         pairs: list[tuple[Variable, Term]] = [
             (self.omega, step.omega),
             (self.converged, 1.0),

@@ -7,7 +7,7 @@ from pydantic import Field
 from accelstudy.files.documents import Document, Part
 
 
-class Anything(Part):
+class MissingEffectTest(Part):
     """Test whether anything is missing.
 
     Attributes
@@ -111,7 +111,7 @@ class SensorState(Part):
     failed: str | None = None
 
 
-class LeftOut(Part):
+class ExcludedCampaign(Part):
     """A campaign that is not in the lot.
 
     Attributes
@@ -159,14 +159,14 @@ class LotDocument(Document):
 
     file = "lot.json"
     sensors: int
-    anything: Anything
+    anything: MissingEffectTest
     effects: list[Effect]
     explained: bool
     close: list[list[str]]
     alternatives: list[Alternative]
     odd: list[OddSensor]
     each: list[SensorState]
-    left_out: list[LeftOut]
+    left_out: list[ExcludedCampaign]
     tilt: Tilt | None
     verdict: str
     files: list[str] = Field([])

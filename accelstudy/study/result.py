@@ -41,7 +41,7 @@ GRID: dict[str, tuple[str, Callable[[str], Any]]] = {
 """Arguments that may be several: the key in a grid of a study, and the lookup of a name."""
 
 
-class OfCell(Part):
+class CellRow(Part):
     """A row of a set-up.
 
     Attributes
@@ -52,7 +52,7 @@ class OfCell(Part):
     cell: str | None = None
 
 
-class SimulatedParameter(OfCell):
+class SimulatedParameter(CellRow):
     """A parameter over all calibrations of a set-up, in SI.
 
     Attributes
@@ -75,7 +75,7 @@ class SimulatedParameter(OfCell):
     unit: str
 
 
-class SimulatedTilt(OfCell):
+class SimulatedTilt(CellRow):
     """Tilt error that a calibration leaves in roll or in pitch, up to 50 gon, in rad.
 
     Attributes

@@ -88,7 +88,7 @@ SETS = ("nothing", *KINDS, *SEVERAL)  # blocks of campaigns
 Row = dict[str, Any]
 
 
-class Nothing(ConfigSection):
+class NullCampaigns(ConfigSection):
     """Campaigns in which nothing is missing.
 
     Attributes
@@ -112,7 +112,7 @@ class Kinds(ConfigSection):
     campaigns: Replicates
 
 
-class Sized(ConfigSection):
+class SizedEffects(ConfigSection):
     """Campaigns with one thing each, in several sizes.
 
     Attributes
@@ -127,7 +127,7 @@ class Sized(ConfigSection):
     campaigns: Replicates
 
 
-class Several(ConfigSection):
+class EffectSets(ConfigSection):
     """Campaigns with two or three effects each.
 
     Attributes
@@ -190,14 +190,14 @@ class HiddenConfig(Study):
     approaches: OneOrMore[str] = Field(["all"])
     sigma: OneOrMore[Literal["given", "not given"]] = Field(default=["given", "not given"])
     baselines_every: Annotated[int, Field(ge=1)] = 20
-    nothing: Nothing | None = None
+    nothing: NullCampaigns | None = None
     noise: Kinds | None = None
-    one: Sized | None = None
-    two: Several | None = None
-    three: Several | None = None
-    removed: Sized | None = None
-    outside: Sized | None = None
-    unforeseen: Sized | None = None
+    one: SizedEffects | None = None
+    two: EffectSets | None = None
+    three: EffectSets | None = None
+    removed: SizedEffects | None = None
+    outside: SizedEffects | None = None
+    unforeseen: SizedEffects | None = None
     gross: Kinds | None = None
     invisible: Kinds | None = None
 

@@ -196,7 +196,7 @@ class CampaignFit:
         return {int(self.campaign.positions[one.position]): one.p_value for one in found}
 
     @cached_property
-    def held_out(self) -> quality.HeldOut | None:
+    def held_out(self) -> quality.HeldOutErrors | None:
         """Prediction of each position from the others; None where those do not determine it."""
         return quality.held_out(self.solution)
 

@@ -190,7 +190,7 @@ class Suspect(Part):
     p_value: float
 
 
-class HeldOut(Part):
+class HeldOutErrors(Part):
     """Errors of positions that the fit to the others predicts.
 
     Attributes
@@ -266,7 +266,7 @@ class Quality(Part):
     verdict: str = ""
     global_test: GlobalTest | None = None
     suspects: list[Suspect] = Field([])
-    held_out: HeldOut | None = None
+    held_out: HeldOutErrors | None = None
     variance_components: VarianceComponents | None = None
     tilt_rms_mgon: Tilt | None = None
 

@@ -143,7 +143,7 @@ def read_ulog(path: Path, instance: str | None = None) -> RawTable:
     # It prints what it thinks of a file.
     with (
         unless_damaged(path, "flight log"),
-        _ToTheEnd(FileIO(path)) as file,
+        _TruncationCheck(FileIO(path)) as file,
         redirect_stdout(StringIO()),
     ):
         log = ULog(file, [_SENSOR])
@@ -177,7 +177,7 @@ def read_ulog(path: Path, instance: str | None = None) -> RawTable:
     return _table(path, rows, columns, "frd", warnings)
 
 
-class _ToTheEnd(BufferedReader):
+class _TruncationCheck(BufferedReader):
     """A file that knows whether its end cut off what was read.
 
     Attributes

@@ -28,7 +28,7 @@ from accelstudy.diagnosis.decision.statement import (
     Statement,
     statement_of,
 )
-from accelstudy.diagnosis.file_format import Found
+from accelstudy.diagnosis.file_format import FoundEffect
 from accelstudy.diagnosis.result import CampaignDiagnosis
 from accelstudy.diagnosis.rules import RULES
 from accelstudy.effects import Effect, get_effect
@@ -101,7 +101,7 @@ def may_be_an_effect(diagnosis: CampaignDiagnosis) -> bool:
     return diagnosis.verdict == "noise_model" and noise_only(diagnosis) < RULES.sure
 
 
-def name_text(named: Found) -> str:
+def name_text(named: FoundEffect) -> str:
     """Name what was found; a learned function by its coordinate."""
     if named.name != LEARNED:
         return words(named.name)
@@ -110,12 +110,12 @@ def name_text(named: Found) -> str:
     return f"the function of {coordinate_of(effect.coordinate).words}"
 
 
-def effect_of(named: Found) -> Effect:
+def effect_of(named: FoundEffect) -> Effect:
     """Effect that was found."""
     return get_effect(named.spec)
 
 
-def title(named: Found, titled: set[str] | None = None) -> str:
+def title(named: FoundEffect, titled: set[str] | None = None) -> str:
     """Name what was found, with all that would be the same and has no title, or its position."""
     if named.position is not None:
         return f"{words(named.name)} {named.position}"

@@ -28,7 +28,7 @@ SETS: Mapping[Any, str] = SCORES["score"]["sets"]
 Question = Mapping[str, Any] | str
 
 
-class Measured(NamedTuple):
+class Measurement(NamedTuple):
     """What was measured of some campaigns, its 95 % interval, and the number of them."""
 
     value: float
@@ -59,7 +59,7 @@ def chosen(rows: pd.DataFrame, question: Mapping[str, Any]) -> pd.DataFrame:
     return rows.query(question["filter"], engine="python") if "filter" in question else rows
 
 
-def measure(rows: pd.DataFrame, question: Question) -> Measured:
+def measure(rows: pd.DataFrame, question: Question) -> Measurement:
     """Put a question, or the name of a column, to campaigns."""
     question = {"of": question} if isinstance(question, str) else question
     rows = chosen(rows, question)
@@ -68,7 +68,7 @@ def measure(rows: pd.DataFrame, question: Question) -> Measured:
     return statistic(x[~np.isnan(x)], question.get("statistic", "share"))
 
 
-def statistic(x: NDArray[np.float64], name: str) -> Measured:
+def statistic(x: NDArray[np.float64], name: str) -> Measurement:
     """Share, mean or median of sorted values; a mean that is `expected` has no interval."""
     n, low, high = len(x), np.nan, np.nan
     if name in ("mean", "expected", "median") and n:
@@ -79,11 +79,11 @@ def statistic(x: NDArray[np.float64], name: str) -> Measured:
         # The interval of a median is between two order statistics.
         if name == "median" and (k := int(binom.ppf(0.025, n, 0.5))):
             low, high = x[k - 1], x[n - k]
-        return Measured(value, low, high, n, name)
+        return Measurement(value, low, high, n, name)
     if not n:
-        return Measured(np.nan, 0.0, 1.0, n, name)
+        return Measurement(np.nan, 0.0, 1.0, n, name)
     low, high = binomtest(int(x.sum()), n).proportion_ci()
-    return Measured(float(x.sum() / n), low, high, n, name)
+    return Measurement(float(x.sum() / n), low, high, n, name)
 
 
 # --- text -----------------------------------------------------------------------------------------
