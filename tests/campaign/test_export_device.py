@@ -280,9 +280,12 @@ def corrected_by_px4(p, readings, temperature):
     return np.stack(columns, axis=1)
 
 
-def test_px4_holds_bias_scale_and_curves_of_the_temperature():
-    calibration = calibration_of("bias-scale+thermal_bias+thermal_curve").sensor
+def test_px4_holds_bias_scale_and_curves_of_the_temperature(tmp_path):
+    model = "bias-scale+thermal_bias+thermal_curve"
+    calibration = calibration_of(model).sensor
     text, lost = export(calibration, "px4")
+    third = acs.export(written(tmp_path, model, log={"variable": "2"}), form="px4")
+    assert third == re.sub(r"(CAL_ACC|TC_A)0_", r"\g<1>2_", text)
     parameters = px4_of(text)
     assert lost == []
     assert parameters["TC_A_ENABLE"] == 1

@@ -1,4 +1,4 @@
-"""A calibration as parameters of PX4, CAL_ACC0_* and TC_A0_*.
+"""A calibration as parameters of PX4, CAL_ACC0_* and TC_A0_*, by the number of the sensor.
 
 PX4 corrects each axis by itself: (reading − TC − OFF) · SCALE, with TC = X1 ΔT + X2 ΔT² + X3 ΔT³,
 ΔT = T − TREF (its Accelerometer::Correct and TemperatureCompensation), as if its reading of a
@@ -53,15 +53,18 @@ def px4_parameters(calibration: SensorCalibration) -> tuple[str, list[str]]:
             "calibrate a flight log of PX4 (sensor_accel)"
         )
     gains, offsets = _fit(calibration)
+    instance = calibration.usual_layout.variable or ""
+    n = instance if instance.isdecimal() else "0"  # a topic is no instance of sensor_accel
     values: dict[str, float] = {}
     for i, axis in enumerate("XYZ"):
-        values[f"CAL_ACC0_{axis}OFF"] = offsets[i, 0]
-        values[f"CAL_ACC0_{axis}SCALE"] = 1 / gains[i]
+        values[f"CAL_ACC{n}_{axis}OFF"] = offsets[i, 0]
+        values[f"CAL_ACC{n}_{axis}SCALE"] = 1 / gains[i]
     if is_warmed := _is_warmed(calibration):
         low, high = calibration.ranges[DEVICE_COLUMNS["temperature"]]
-        values |= {"TC_A0_TREF": REFERENCE_TEMPERATURE, "TC_A0_TMIN": low, "TC_A0_TMAX": high}
+        values |= {f"TC_A{n}_TMIN": low, f"TC_A{n}_TMAX": high}
+        values[f"TC_A{n}_TREF"] = REFERENCE_TEMPERATURE
         for i, powers in enumerate(offsets):
-            values |= {f"TC_A0_X{k}_{i}": x if k else 0.0 for k, x in enumerate(powers)}
+            values |= {f"TC_A{n}_X{k}_{i}": x if k else 0.0 for k, x in enumerate(powers)}
     shown = {name: _positional(value) for name, value in sorted(values.items())}
     lags = [
         (effect.name, tau)
@@ -72,7 +75,7 @@ def px4_parameters(calibration: SensorCalibration) -> tuple[str, list[str]]:
     lost = render_lines(TEMPLATE, "losses", *loss, loss.max() > MIN_LOSS_MGON, lags, MAX_TILT_GON)
     axes = calibration.usual_layout.axes
     lines = render_lines(
-        TEMPLATE, "parameters", calibration, __version__, lost, axes, is_warmed, shown
+        TEMPLATE, "parameters", calibration, __version__, n, lost, axes, is_warmed, shown
     )
     return "\n".join(lines) + "\n", lost
 
