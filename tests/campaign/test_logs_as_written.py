@@ -381,12 +381,13 @@ CLOCKS = {
     "us": np.round(TIME * 1e6 + 2**32 - 20e6).astype(np.int64) % 2**32 - 2**31,  # signed
     "time": [f"{START + timedelta(seconds=41 + t):%H:%M:%S.%f}" for t in TIME],
 }
+CLOCKS["TimeUS"] = CLOCKS["us"]  # of ArduPilot, whose column T is a temperature
 
 
 @pytest.mark.parametrize("name", CLOCKS)
 def test_a_clock_that_begins_anew_is_counted_on(name):
     log = table(CLOCKS[name], names=(name, "ax", "ay", "az"))
-    campaign = found(log)
+    campaign = found(log.assign(T=TEMPERATURE) if name == "TimeUS" else log)
     assert_timed(campaign)
     assert "the clock wraps around, and is counted on: row 1001" in said(campaign)
     assert "wraps" not in said(found(table()))

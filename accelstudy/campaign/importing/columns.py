@@ -49,12 +49,13 @@ _USUAL = {
     r"|(sensor|device)_?(id|no|nr|num(ber|mer)?|name)_?",
 }
 _LESS_USUAL = {
-    "time": r"t|(.*_)?secs?|(date|sample|sensor|log)_?time|date|elapsed(_time)?",
+    "time": r"(.*_)?secs?|(date|sample|sensor|log)_?time|date|elapsed(_time)?|time[mun]s",
     "temperature": r".*(?<![a-z])temp(erature)?s?c?(?![a-z]).*",
 }
 """Names that count where no column has a usual one."""
-_LEAST_USUAL = {"time": r"[mun]s|milli(s|seconds?)|micro(s|seconds?)"}
-"""Units as names, as of millis() of a microcontroller, which count after these."""
+_LEAST_USUAL = {"time": r"t|[mun]s|milli(s|seconds?)|micro(s|seconds?)"}
+"""Names that count after these: a letter that may be a temperature, and units, as of millis() of a
+microcontroller."""
 _UNITS_OF: Mapping[str, Collection[str]] = {
     **dict.fromkeys((*(k for k in _USUAL if "f" in k), "vibration"), (*SENSOR_UNITS, "counts")),
     "time": CLOCK_UNITS,
@@ -261,7 +262,9 @@ def without_unit(name: str) -> str:
 def unit_in(name: str, key: str) -> str | None:
     """Unit that the name of the column of a key says; None if it says none of this quantity."""
     parts = (pattern.fullmatch(name.strip()) for pattern in (_IN_BRACKETS, _AS_ENDING))
-    words = [part[2] for part in parts if part] + ([name] if key == "time" else [])
+    # A unit may be all of a name, as "ms", or end it, as in "TimeUS" of ArduPilot.
+    alone = [name.strip().lower().removeprefix("time")] if key == "time" else []
+    words = [part[2] for part in parts if part] + alone
     units = map(parse_unit, words)
     return next((unit for unit in units if unit in _UNITS_OF.get(key, ())), None)
 
