@@ -82,7 +82,7 @@ def test_text_in_any_layout_gives_the_same_numbers(calibration, layout):
 
 @pytest.mark.parametrize(("name", "variable"), [("log", None), ("log.T", None), ("other", "log")])
 def test_matlab(tmp_path, name, variable):
-    arrays = {"log": TABLE.T if name == "log.T" else TABLE, "name": "x"}
+    arrays = {"log": TABLE.T if name == "log.T" else TABLE, "name": "x", "t": TABLE[:, :1]}
     arrays |= {"other": 1j * FORCES, "none": []} if variable else {}
     savemat(tmp_path / "log.mat", arrays, format="5" if variable else "4")
     log = open_log(tmp_path / "log.mat", variable=variable, **BY_PLACE)

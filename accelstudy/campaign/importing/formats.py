@@ -12,6 +12,7 @@ import pyarrow as pa
 from accelstudy.basics.errors import InputError
 from accelstudy.basics.wording import one_line
 from accelstudy.campaign.importing import bags
+from accelstudy.campaign.importing.columns import AXES
 from accelstudy.campaign.importing.raw_table import RawTable, choose, unless_damaged
 from accelstudy.campaign.importing.text import GZIP, TextTable
 from accelstudy.files.reading import readable
@@ -74,9 +75,9 @@ def _read_matlab(path: Path, variable: str | None) -> RawTable:
         arrays = [
             name
             for name, shape, kind in kinds
-            if _IS_NUMBER.fullmatch(kind) and len(shape) == 2 and all(shape)
+            if _IS_NUMBER.fullmatch(kind) and len(shape) == 2 and min(shape) >= len(AXES)
         ]
-        name = choose(path, "array", arrays, variable)
+        name = choose(path, "array of 3 columns or more", arrays, variable)
         array = loadmat(path, variable_names=[name])[name]
     if np.iscomplexobj(array):
         raise InputError(f"{path}: array {name} has complex numbers")
