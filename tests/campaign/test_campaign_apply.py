@@ -7,6 +7,7 @@ import pandas as pd
 import pyarrow as pa
 import pyarrow.parquet as pq
 import pytest
+from calling import refused
 from campaign_helpers import simulated_campaign, with_keys
 from usual import NINE, ROBOT
 
@@ -386,3 +387,5 @@ def test_a_reading_at_the_end_of_the_range_is_no_measurement(plain, tmp_path):
         (warning,) = leveled.warnings
         assert "line 2: the calibration has no force for such a reading" in warning
         assert ("± 9.05 m/s²" in warning) == (known is ranged)
+        with refused("no row can be corrected; the first: row 1: the calibration has no force"):
+            level(known, pd.DataFrame([[0, 0, -9.05]], columns=["fx", "fy", "fz"]))

@@ -78,8 +78,8 @@ def level(
     Raises
     ------
     InputError
-        If the log cannot be read, lacks a column that an effect of the calibration needs, or is so
-        far from gravity in most rows that it must be in another unit.
+        If the log cannot be read, lacks a column that an effect of the calibration needs, is so far
+        from gravity in most rows that it must be in another unit, or no row can be corrected.
     """
     leveled = Leveling(
         calibration, read_log(log, given or {}, calibration.usual_layout), sigma, start
@@ -153,10 +153,11 @@ class Leveling:
             raise InputError(f"{where}; give it by {OPTIONS[condition]}")
         self.log.check_units([condition for _, condition in self.calibration.model.needs])
         usable = self.forces[np.isfinite(self.forces).all(axis=1)]
-        if not len(usable):
+        if len(usable):
+            check_size(f"{path}", usable, self.calibration.gravity, self.log.layout.conversion)
+        if not len(self.forces) or self.lost.all():
             first = f"; the first: {self.reason(0)}" if len(self.forces) else ""
-            raise InputError(f"{path}: no row has three numbers{first}")
-        check_size(f"{path}", usable, self.calibration.gravity, self.log.layout.conversion)
+            raise InputError(f"{path}: no row can be corrected{first}")
 
     # --- the columns that are added --------------------------------------------------------------
 
