@@ -14,7 +14,7 @@ from accelstudy.approaches import Approach, get_approach
 from accelstudy.basics.arrays import Array
 from accelstudy.basics.errors import InputError
 from accelstudy.basics.units import MGON
-from accelstudy.basics.wording import words
+from accelstudy.basics.wording import plural, words
 from accelstudy.campaign.calibration.campaign_fit import CampaignFit
 from accelstudy.campaign.columns import COLUMNS
 from accelstudy.campaign.gross_errors.recognition import recognise
@@ -186,9 +186,10 @@ def _determined(
     """Say what the positions determine, or raise `InputError` if that is not the model."""
     theory = campaign_estimability(campaign, model, approach, blur)
     if not theory.estimable:
+        n = campaign.n_positions
         raise InputError(
-            f"{campaign.name}: {campaign.n_positions} positions do not determine the model "
-            f"{model.name!r}: {theory.reason}"
+            f"{campaign.name}: {plural(n, 'position')} {'does' if n == 1 else 'do'} not determine "
+            f"the model {model.name!r}: {theory.reason}"
         )
     return theory
 

@@ -132,12 +132,19 @@ def find_holds(log: Log, settings: ImportSettings) -> Holds:
         warnings.append("with a `range`, `apply` leaves the rows of saturated readings empty")
     if not (table["left_out"] == "").any():
         if TURNS in why:
-            raise _never_still(log, windows, "it turns slowly in all that looks like a hold")
+            raise _never_still(
+                log, windows, settings, "it turns slowly in all that looks like a hold"
+            )
         raise InputError(
             f"{log.path}: no static hold of {settings.shortest:g} s or more (a window is at rest "
             f"up to {windows.threshold:.3g} m/s²)" + "".join(f"; {w}" for w in warnings)
         )
     return _holds_of(log, windows, table, settings, warnings)
+
+
+def shortest_rest(log: Log, settings: ImportSettings) -> float:
+    """Length of a rest, s, of which the shortest hold is left without its ends."""
+    return (settings.window or usual_window(log)) + 2 * settings.trim + settings.shortest
 
 
 def _runs_at_rest(
@@ -157,13 +164,13 @@ def _runs_at_rest(
     short = lengths[(lengths >= MIN_REST) & (lengths < least)]
     if not len(short):
         return runs, []
-    lost = (settings.window or usual_window(log)) + 2 * settings.trim
+    whole = shortest_rest(log, settings)
     spans = (np.sort(short)[[0, -1]] + 2 * cut + windows.width) * step
     said = " to ".join(dict.fromkeys(f"{span:.1f}" for span in spans))
     are, them = ("are", "them") if len(short) > 1 else ("is", "it")
     return runs, [
-        f"{plural(len(short), 'rest')} of {said} s {are} no hold: it takes {lost + shortest:.3g} s,"
-        f" of which {lost:.3g} s at its ends do not count; `shortest` "
+        f"{plural(len(short), 'rest')} of {said} s {are} no hold: it takes {whole:.3g} s, of which "
+        f"{whole - shortest:.3g} s at its ends do not count; `shortest` "
         f"{step * short.min():.4g} (now {shortest:g}) takes {them}"
     ]
 
@@ -322,7 +329,7 @@ def _holds_of(
             f"what looks like rest varies by {windows.floor:.3g} m/s², like a hand, not like the "
             "noise of a sensor"
         )
-        raise _never_still(log, windows, why, size)
+        raise _never_still(log, windows, settings, why, size)
     return holds
 
 
@@ -341,7 +348,9 @@ def _moves(holds: Holds, records: Sequence[Array]) -> bool:
     return bool(not reliable.any() or np.any(reliable & (curve.pooled > SLOW_RATIO * white)))
 
 
-def _never_still(log: Log, windows: Windows, why: str, size: int | None = None) -> InputError:
+def _never_still(
+    log: Log, windows: Windows, settings: ImportSettings, why: str, size: int | None = None
+) -> InputError:
     if size is not None:
         return InputError(
             f"{log.path}: blocks of {size} samples are no positions: {why}; is the number of "
@@ -350,7 +359,8 @@ def _never_still(log: Log, windows: Windows, why: str, size: int | None = None) 
     return InputError(
         f"{log.path}: the sensor was never still: {why}; the quietest hundredth of its windows of "
         f"{windows.width * log.step:.2g} s varies by {_quietest(windows):.3g} m/s². Lay it down "
-        "for some seconds in each of ten or more attitudes, on a table or in a fixture"
+        f"for {shortest_rest(log, settings):.3g} s or more in each of ten or more attitudes, on a "
+        "table or in a fixture"
     )
 
 

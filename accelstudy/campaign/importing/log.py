@@ -223,7 +223,8 @@ class Log:
             row = int(samples.index[1 + int(np.argmax(backward))])
             raise InputError(
                 f"{self.path}: {self.describe(row, 'time')}, not after the row above; sort the "
-                "rows by time, or, if its clock is coarse or began anew, give `rate`"
+                "rows by time, take those of one sensor, or, if its clock is coarse or began anew, "
+                "give `rate`"
             )
         if lost.sum() > MAX_BAD_SHARE * len(lost):
             row = int(np.argmax(lost))

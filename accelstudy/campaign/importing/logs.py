@@ -17,11 +17,10 @@ from accelstudy.basics.wording import comma_list, short_list
 from accelstudy.campaign.gross_errors.recognition import check_plausible
 from accelstudy.campaign.header import LogLayout
 from accelstudy.campaign.importing.columns import ANGLES, AXES, MEANS, SDS, thermometers
-from accelstudy.campaign.importing.holds import Holds, find_blocks, find_holds
+from accelstudy.campaign.importing.holds import Holds, find_blocks, find_holds, shortest_rest
 from accelstudy.campaign.importing.log import AnyLog, Log, join, read_log
 from accelstudy.campaign.importing.noise import sigma_text, steps_text
 from accelstudy.campaign.importing.settings import ImportSettings
-from accelstudy.campaign.importing.windows import usual_window
 from accelstudy.campaign.session import Campaign
 from accelstudy.leveling.angles import usual_norm
 
@@ -112,9 +111,8 @@ def _are_short(log: Log, settings: ImportSettings) -> bool:
     """Whether files of one position each have no rate, or all are too short to find a hold in."""
     if not all(part.timed for part in log.parts):
         return True
-    window = settings.window or usual_window(log)
-    least = window + 2 * settings.trim + settings.shortest
-    return max(len(part.whole_samples) for part in log.parts) * log.step < least
+    longest = max(len(part.whole_samples) for part in log.parts) * log.step
+    return longest < shortest_rest(log, settings)
 
 
 # --- A table of means ----------------------------------------------------------------------------

@@ -138,7 +138,7 @@ class RawTable:
     def look_up(self, row: int, place: int) -> tuple[str, str]:
         """Describe where a row is in the file, and what its cell in a column holds."""
         cell = self.content.column(place)[row].as_py()
-        shown = f"{cell:g}" if isinstance(cell, float | int) else repr(str(cell)[:40])
+        shown = str(cell) if isinstance(cell, float | int) else repr(str(cell)[:40])
         return f"row {row + 1}", "nan" if cell is None else shown
 
 
@@ -168,7 +168,7 @@ def unless_damaged(path: Path, kind: str) -> Iterator[None]:
 def choose(path: Path, what: str, names: Collection[str], wanted: str | None) -> str:
     """Return the name that is wanted, or the only one."""
     if wanted is not None and wanted not in names:
-        raise UnknownNameError(f"{what} in {path}", wanted, names)
+        raise UnknownNameError(f"{what} in {path}", wanted, names, "; `variable` chooses one")
     if wanted is None and len(names) != 1:
         if not names:
             raise InputError(f"{path}: no {what}")
