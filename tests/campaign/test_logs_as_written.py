@@ -293,6 +293,13 @@ def test_a_recording_has_forces_temperatures_and_axes(folder, name, settings, tu
         np.testing.assert_allclose(campaign.temperature, 20 + campaign.time / 20, atol=0.05)
 
 
+def test_a_temperature_before_the_thermometer_is_unknown(tmp_path):
+    write_bag(tmp_path / "late", TIME, {"/imu": FORCES}, {"/heat": TEMPERATURE[N // 2 :]})
+    campaign = found(tmp_path / "late", FLU)
+    assert campaign.temperature is None
+    assert "temperature: topic /heat | " in said(campaign)
+
+
 @pytest.mark.parametrize(("name", "part"), [
     ("none.bag", "no topic of sensor_msgs/Imu"),
     ("several", "which topic of sensor_msgs/Imu? There are /a/imu, /b/imu; give --variable"),

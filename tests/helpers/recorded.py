@@ -19,7 +19,7 @@ def write_bag(path, time, topics, temperature=None, frame="imu_link", stamped=Tr
     Parameters
     ----------
     topics : mapping of topic to forces (n, 3), m/s²
-    temperature : mapping of topic to (n,), °C, of which every tenth is written
+    temperature : mapping of topic to the last of n, °C, of which every tenth is written
     """
     first = path.suffix == ".bag"
     store = get_typestore(Stores.ROS1_NOETIC if first else Stores.ROS2_HUMBLE)
@@ -34,7 +34,7 @@ def write_bag(path, time, topics, temperature=None, frame="imu_link", stamped=Tr
         for kind, series, every in ((IMU, topics, 1), (TEMPERATURE, temperature or {}, 10)):
             for topic, values in series.items():
                 connection = bag.add_connection(topic, kind, typestore=store)
-                for t, value in list(zip(time, values, strict=True))[::every]:
+                for t, value in list(zip(time[-len(values) :], values, strict=True))[::every]:
                     nanoseconds = round(t * 1e9)
                     seconds, rest = divmod(EPOCH * 10**9 + nanoseconds, 10**9)
                     at = stamp(seconds, rest) if stamped else stamp(0, 0)

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager, redirect_stdout
+from dataclasses import replace
 from io import BufferedReader, FileIO, StringIO
 from operator import attrgetter
 from pathlib import Path
@@ -35,6 +36,8 @@ _IMU, _TEMPERATURE = "sensor_msgs/msg/Imu", "sensor_msgs/msg/Temperature"
 _BAG_COLUMNS = {f"f{axis}": f"linear_acceleration.{axis}" for axis in "xyz"}
 _SENSOR = "sensor_accel"
 _LONGEST_GAP = 3600.0  # s
+_THERMAL_TIME = 10.0
+"""Seconds in which a temperature hardly changes; before and after a thermometer it is unknown."""
 _FIELDS = {"fx": "x", "fy": "y", "fz": "z", "temperature": "temperature"}
 
 
@@ -67,8 +70,9 @@ def read_bag(path: Path, topic: str | None = None) -> RawTable:
         frame = next((message.header.frame_id for _, message in _messages(reader, imu)), "")
         rows = _rows(reader, imu, 4, attrgetter(*_BAG_COLUMNS.values()))
         expected = sum(connection.msgcount for connection in imu)
-        temperatures = _rows(reader, _thermometer(reader, name), 2, lambda m: (m.temperature,))
-    warnings = []
+        thermometer = _thermometer(reader, name)
+        temperatures = _rows(reader, thermometer, 2, lambda m: (m.temperature,))
+    notes, warnings = [], []
     if len(rows) < expected:
         end = rows[-1, 0] - rows[0, 0] if len(rows) else 0.0
         warnings.append(
@@ -77,9 +81,14 @@ def read_bag(path: Path, topic: str | None = None) -> RawTable:
         )
     columns = dict(_BAG_COLUMNS)
     if len(temperatures):
-        rows = np.column_stack([rows, np.interp(rows[:, 0], *temperatures.T)])
+        time, (first, last) = rows[:, 0], temperatures[[0, -1], 0]
+        warm = np.interp(time, *temperatures.T)
+        warm[(time < first - _THERMAL_TIME) | (time > last + _THERMAL_TIME)] = np.nan
+        rows = np.column_stack([rows, warm])
         columns["temperature"] = "temperature"
-    return _table(path, rows, columns, "frd" if frame.endswith("_ned") else "flu", warnings)
+        notes.append(f"temperature: topic {thermometer[0].topic}")
+    frame = "frd" if frame.endswith("_ned") else "flu"
+    return replace(_table(path, rows, columns, frame, warnings), notes=notes)
 
 
 def _table(
