@@ -301,7 +301,6 @@ def _lines(*given: Any, **more: Any) -> tuple[str, ...]:
 def _notes(holds: Holds, reference: str, rounded: bool) -> tuple[str, ...]:
     """How a log was read, and what was found in it, a line each."""
     log = holds.log
-    time = log.time[holds.windows.about]
     return _lines(
         "notes",
         holds,
@@ -309,7 +308,7 @@ def _notes(holds: Holds, reference: str, rounded: bool) -> tuple[str, ...]:
         used={"time": "", "temperature": "", **log.layout.columns, **log.used},
         heat=[log.raw.labels[place] for place in thermometers(log.raw.names)],
         reference=reference,
-        seconds=time[-1] - time[0],
+        seconds=np.ptp(log.time),
         steps=steps_text(holds.windows.steps) if rounded else "",
     )
 
