@@ -131,7 +131,7 @@ def _confirm(problem: Problem, finding: Finding, rng: np.random.Generator) -> Co
     rivals = [
         (one.names[0], part.singles.best[one.names[0]])
         for one in finding.posterior.reported[: RULES.held_out_rivals + 1]
-        if len(one.best) == 1 and one.best[0].place is None and one.names[0] in part.singles.best
+        if len(one.best) == 1 and one.best[0].outlier is None and one.names[0] in part.singles.best
     ]
     shares = softmax([log_density(best) for _, best in rivals]) if rivals else ()
     sure = sum(share for (name, _), share in zip(rivals, shares, strict=True) if name in names)
@@ -218,7 +218,7 @@ class HeldOutTest:
 
     @property
     def significant(self) -> bool:
-        """Whether the correction is right."""
+        """Whether the correction predicts so well that it confirms what was found."""
         return self.z > RULES.z_confirmed
 
 

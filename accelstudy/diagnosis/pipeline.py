@@ -39,9 +39,13 @@ def diagnose(
     Parameters
     ----------
     campaign : Campaign
-    model : SensorModel, which may lack an effect
-    approach : Approach; by default robot-aided if the campaign has the robot's angles
-    seed : int, of all random numbers
+        Positions and what is known of their noise.
+    model : SensorModel
+        The base model, which may lack an effect.
+    approach : Approach
+        By default robot-aided if the campaign has the robot's angles.
+    seed : int
+        Seed of all random numbers.
 
     Raises
     ------
@@ -52,7 +56,7 @@ def diagnose(
     recognised = recognise(campaign, approach.uses_angles)
     if recognised is not None:
         campaign = recognised.corrected
-    # A random stream for each stage that draws, so that none changes the numbers of the other.
+    # A random stream for each stage that draws, so that neither changes the numbers of the other.
     null, split = (np.random.SeedSequence(seed, spawn_key=(key,)) for key in (0, 1))
     problem = pose(fit_base(campaign, model, approach), null)
     finding = decide(problem, campaign)

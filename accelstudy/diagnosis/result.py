@@ -181,8 +181,8 @@ class CampaignDiagnosis:
         of_logs = iter(sigma[len(solution.parameters) :])
         for cause in chosen:
             best, members = cause.shape, cause.members
-            if best.place is not None:
-                at = int(self.campaign.positions[best.place])
+            if best.outlier is not None:
+                at = int(self.campaign.positions[best.outlier])
                 yield FoundEffect.of_name(OUTLIER, cause.posterior, at)
                 continue
             # What is beside a large effect was found in what its refit leaves.

@@ -98,7 +98,8 @@ def order_changes(table: pd.DataFrame) -> pd.DataFrame:
     """Find the pairs of inputs whose order the correlations change.
 
     An input overtakes another if its Shapley effect is the larger of the two and its total effect
-    the smaller, by more than `SHARE_TOLERANCE` either way, and one of the shares is `MIN_SHARE`.
+    the smaller, by more than `SHARE_TOLERANCE` of it, and each input has `MIN_SHARE` by one of the
+    two.
 
     Parameters
     ----------

@@ -123,7 +123,7 @@ class Sensor:
             logs |= {f"{UNKNOWN}({of} → {t})": float(log) for (of, t), log in places.items()}
         nothing = float(np.logaddexp.reduce(by_level))
         effects = {
-            name: [one.effect for one in shapes.hypotheses if one.place is None]
+            name: [one.effect for one in shapes.hypotheses if one.outlier is None]
             for name, shapes in problem.frame.candidates.items()
         }
         best = problem.singles.best

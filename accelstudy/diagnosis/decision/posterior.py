@@ -91,7 +91,7 @@ class Posterior:
 
     @classmethod
     def of(cls, weighed: Sequence[Explanation]) -> Posterior:
-        """Gather them; those that mean the same in this campaign become one."""
+        """Posterior of explanations; those that mean the same in this campaign become one."""
         merged: dict[tuple[tuple[str, ...], ...], Explanation] = {}
         for one in sorted(weighed, key=lambda one: -one.log_weight):
             key = tuple(sorted(one.classes))

@@ -1,6 +1,6 @@
 """What a diagnosis has to explain: the fit of the base model, and all that may be missing from it.
 
-Each piece of the evidence is weighed when it is asked for, and then kept.
+Each piece of the evidence is computed on demand, and cached.
 """
 
 from __future__ import annotations
@@ -121,7 +121,7 @@ class Problem:
     Attributes
     ----------
     base : BaseFit
-    frame : SessionFit, of the same
+    frame : SessionFit, of the base fit; after `at`, of another fit to the same campaign
     seed : SeedSequence, of the simulated noise
     """
 
@@ -199,7 +199,7 @@ class Problem:
         strength = self.singles.densities
         for (shapes, _), log in zip(sets, logs, strict=True):
             best = sorted(shapes, key=lambda h: -strength[h.name]) if log >= least else []
-            effects = [members[h.name] for h in best if h.place is None]
+            effects = [members[h.name] for h in best if h.outlier is None]
             if best and len(set(effects)) == len(effects):
                 named = (Cause(called.get(h.name, h.name), members[h.name], h) for h in best)
                 weighed.append(Explanation(tuple(named), log))

@@ -32,7 +32,7 @@ RANGE_FACTOR = 1.6
 
 def refit(base: Solution, chosen: Sequence[Hypothesis]) -> Solution | None:
     """Fit with effects added and bumped positions left out; None if it has no solution."""
-    effects = [h.distinguishable for h in chosen if h.place is None]
+    effects = [h.distinguishable for h in chosen if h.outlier is None]
     together = (*base.model.effects, *effects)
     try:
         model = SensorModel(composition_name(together), together) if effects else base.model
@@ -41,7 +41,7 @@ def refit(base: Solution, chosen: Sequence[Hypothesis]) -> Solution | None:
     # Started from an ideal sensor, the iterations may not reach a large effect.
     start = dict(zip(base.model.parameter_names, base.parameters, strict=False))
     observed = replace(base.observed, initial=model.vector(start))
-    bumped = [h.place for h in chosen if h.place is not None]
+    bumped = [h.outlier for h in chosen if h.outlier is not None]
     if bumped:
         observed = observed.take(np.setdiff1d(np.arange(len(base.misclosures)), bumped))
     try:

@@ -199,7 +199,7 @@ class Reason(NamedTuple):
 
 @dataclass(frozen=True)
 class Finding:
-    """What is said of a problem, with the hypotheses and the fit that it is said by.
+    """Answer to a problem: the verdict, its reason, and the causes and the fit that it rests on.
 
     Attributes
     ----------

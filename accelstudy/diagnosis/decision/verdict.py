@@ -78,11 +78,11 @@ def _judge(problem: Problem, posterior: Posterior) -> Finding:
         if fit is None or reason.code:
             return Finding("unknown", frame, reason, posterior=posterior)
         found = [replace(cause, posterior=top.posterior) for cause in fit.causes]
-        found.sort(key=lambda one: one.shape.place is None)
+        found.sort(key=lambda one: one.shape.outlier is None)
         credible, verdict = posterior.credible_set, ""
         of_effects = sum(one.posterior for one in credible if one.is_effects)
         sure = top.posterior >= RULES.sure
-        if sure and found[0].shape.place is not None:
+        if sure and found[0].shape.outlier is not None:
             verdict = "gross_error"
         elif top.posterior >= RULES.named:
             verdict = "named"
@@ -130,7 +130,7 @@ def dismiss_weak_evidence(problem: Problem, finding: Finding) -> Finding | None:
 def is_large(problem: Problem, single: Explanation) -> bool:
     """Whether an effect is so large that its signature to first order is not enough."""
     z, basis = problem.residuals.z, single.best[0].basis
-    return single.best[0].place is None and float(np.sum((z @ basis) ** 2)) > RULES.large
+    return single.best[0].outlier is None and float(np.sum((z @ basis) ** 2)) > RULES.large
 
 
 def posterior_by_refits(problem: Problem, single: Explanation, count: int) -> Posterior:

@@ -192,7 +192,7 @@ def weigh_singles(frame: SessionFit, evidence: Evidence) -> Singles:
 def refine(frame: SessionFit, shapes: Hypotheses) -> Hypotheses:
     """Add shapes between the neighbours of the best one, and again between those."""
     z = frame.residuals.z
-    if shapes[0].place is not None or len(shapes) < 2:
+    if shapes[0].outlier is not None or len(shapes) < 2:
         return shapes
     if shapes[0].smooth is None:
         return _complete(frame, shapes)

@@ -103,12 +103,12 @@ def tail_probability(values: Array, weights: Array, value: float) -> float:
 
 def draw_effects(spaces: Spaces, count: int, rng: np.random.Generator) -> Array:
     """Draw what a random space, of one of the sizes `PROPOSED`, adds to residuals, (count, m)."""
-    places = rng.choice(len(spaces.prior), size=count, p=spaces.prior)
+    chosen = rng.choice(len(spaces.prior), size=count, p=spaces.prior)
     sizes = rng.choice(PROPOSED, size=count)
-    dims = spaces.dims[places]
+    dims = spaces.dims[chosen]
     sigmas = np.sqrt(np.repeat(sizes / dims, dims))
     rows = np.repeat(np.arange(count), dims)
-    first = np.repeat(spaces.ends[places] - (np.cumsum(dims) - dims), dims)
+    first = np.repeat(spaces.ends[chosen] - (np.cumsum(dims) - dims), dims)
     columns = np.zeros((count, spaces.vectors.shape[1]))
     columns[rows, first + np.arange(len(rows))] = rng.standard_normal(dims.sum()) * sigmas
     return np.asarray(columns @ spaces.vectors.T)

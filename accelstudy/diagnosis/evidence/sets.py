@@ -34,7 +34,7 @@ from accelstudy.diagnosis.rules import RULES
 from accelstudy.diagnosis.space.hypotheses import OUTLIER, Hypotheses, Hypothesis, joint_basis
 from accelstudy.diagnosis.space.residuals import Residuals
 
-Places = tuple[int, ...]
+Numbers = tuple[int, ...]
 """Numbers of candidates, ascending; that of the outlying positions may be there twice."""
 
 
@@ -105,32 +105,32 @@ class _Search:
         ]
         self.gram, self.seen = spaces.vectors.T @ spaces.vectors, self.z @ spaces.vectors
         nothing = float(np.logaddexp.reduce(evidence.noise_density(self.square)))
-        self.found: dict[Places, tuple[float, tuple[int, ...]]] = {(): (nothing, ())}
-        self.weights: dict[Places, float] = {}
-        self.extended: set[Places] = set()
+        self.found: dict[Numbers, tuple[float, tuple[int, ...]]] = {(): (nothing, ())}
+        self.weights: dict[Numbers, float] = {}
+        self.extended: set[Numbers] = set()
 
-    def extend(self, places: Places) -> None:
+    def extend(self, numbers: Numbers) -> None:
         """Weigh a set with each candidate, whose shapes are integrated."""
-        self.extended.add(places)
-        total, chosen = self.found[places]
+        self.extended.add(numbers)
+        total, chosen = self.found[numbers]
         alone, logs = self._with_each_further(chosen)
         logs += self.shape_priors
         sums = np.logaddexp.reduceat(logs, self.firsts) + (total - alone)
         for k in np.flatnonzero(np.isfinite(sums)).tolist():
-            more, log = tuple(sorted((*places, k))), float(sums[k])
+            more, log = tuple(sorted((*numbers, k))), float(sums[k])
             if more not in self.found or self.found[more][0] < log:
                 first = int(self.firsts[k])
                 best = first + int(np.argmax(logs[first : first + self.counts[k]]))
                 self.found[more] = log, (*chosen, best)
                 self.weights[more] = log + set_prior(len(more), len(self.counts))
 
-    def next(self) -> Places | None:
+    def next(self) -> Numbers | None:
         """Strongest set that was not extended yet, or such a set without one of its members."""
         least = max(self.weights.values(), default=0.0) - RULES.sets_within
-        strong = [places for places, weight in self.weights.items() if weight > least]
-        for places in sorted(strong, key=self.weights.__getitem__, reverse=True):
-            without = [(*places[:i], *places[i + 1 :]) for i in range(len(places))]
-            for one in (places, *without):
+        strong = [numbers for numbers, weight in self.weights.items() if weight > least]
+        for numbers in sorted(strong, key=self.weights.__getitem__, reverse=True):
+            without = [(*numbers[:i], *numbers[i + 1 :]) for i in range(len(numbers))]
+            for one in (numbers, *without):
                 if len(one) < RULES.set_members and one in self.found and one not in self.extended:
                     return one
         return None
@@ -139,12 +139,12 @@ class _Search:
         """Sets of two and more; in the strongest, bounds hold for each beside the others."""
         least = max(self.weights.values(), default=0.0) - RULES.bounds_within
         sets = []
-        for places, (log, chosen) in self.found.items():
+        for numbers, (log, chosen) in self.found.items():
             if len(chosen) < 2:
                 continue
             best = tuple(self.shapes[i] for i in chosen)
             for one, i in zip(best, chosen, strict=True):
-                if self.weights[places] > least and one.estimates is not None:
+                if self.weights[numbers] > least and one.estimates is not None:
                     beside = joint_basis([o for o in best if o is not one], len(self.z))
                     log += within_bounds(one, self.z, self.evidence, beside) - self.factors[i]
             sets.append((best, float(log)))

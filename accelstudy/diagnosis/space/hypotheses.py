@@ -49,7 +49,7 @@ class Hypothesis:
     directions : (k, l) array, combinations of the parameters that the positions show
     basis : (m, l) array, orthonormal, of the space of its signature in the residuals
     ideal : (m, l) array, likewise for an ideal sensor, at which equal effects are exactly equal
-    place : int, index of the position that was bumped; None for an effect
+    outlier : int, index of the position that was bumped; None for an effect
     estimates : (l, l) array, turns products of the basis with residuals into the l parameters that
         show most; None for effects whose parameters have no bounds
     """
@@ -59,7 +59,7 @@ class Hypothesis:
     directions: Array
     basis: Array
     ideal: Array
-    place: int | None = None
+    outlier: int | None = None
     estimates: Array | None = None
 
     @property
@@ -159,7 +159,7 @@ class Hypotheses(Spaces):
 
     @classmethod
     def of(cls, hypotheses: Sequence[Hypothesis]) -> Hypotheses:
-        """Gather shapes."""
+        """Hypotheses with their prior probabilities as shapes of one thing."""
         weights, dims = np.ones(len(hypotheses)), np.array([h.dim for h in hypotheses])
         if len(hypotheses) > 1 and hypotheses[0].smooth is not None:
             weights = np.gradient(np.log([h.value for h in hypotheses]))
