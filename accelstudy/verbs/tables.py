@@ -125,8 +125,8 @@ def visible_effects(
             examined = visibility.examine_scheme(get_scheme(scheme), get_model(model), by)
         table = visibility.visibility_table(examined)
     table.attrs["legend"] = (
-        "MDB: size of one parameter that a test at 0.1 % detects with a probability of 80 %;"
-        "\nMIB: size at which the effect can also be told from the one it is most like;"
+        "MDB, minimal detectable bias: parameter that a test at 0.1 % finds in 80 of 100 cases;"
+        "\nMIB, minimal identifiable bias: size that also excludes the most similar effect;"
         "\nwith: setting in which the effect shows best, of those that a diagnosis tries;"
         "\nconfused with: the nearest effects and the cosine of their signatures, 1 for the same."
         f"\n{units.angle_note()}."

@@ -46,7 +46,7 @@ def test_the_intervals_of_a_calibration_hold_95_percent():
     assert one.content["redundancy"] == 15
     assert needed == pytest.approx(2.131, abs=5e-4)  # of any table of Student's t
     assert [p["ci95"] for p in one.content["parameters"]] == pytest.approx(needed * fit.sigma)
-    assert "2.13 of them hold 95 % (Student's t, r = 15)" in sentences(fit, "sigmas")[0]
+    assert "2.13 sigmas hold 95 % (Student's t, 15 degrees" in sentences(fit, "sigmas")[0]
 
     adjusted = calibrate(NINE, GRAVITY, Observations(forces, sigma_force=SIGMA, gravity=G))
     truth = np.concatenate([BIAS, SCALE, np.zeros(3)])

@@ -166,7 +166,7 @@ def test_a_narrowed_diagnosis_is_told_as_a_set(named, tmp_path):
         "➜ NARROWED The model lacks an effect of temperature: thermal bias or thermal curve.",
         "Explanations, most probable first: thermal bias (0.55) and thermal curve (0.4);",
         "whether thermal bias or thermal curve is missing",
-        "takes thermal bias, and its sigmas do not know of the others",
+        "takes thermal bias, and its sigmas do not allow for the others",
     ):
         assert words in text, words
     assert yaml.safe_load((tmp_path / "model.yaml").read_text("utf-8"))["models"]

@@ -14,7 +14,7 @@ from accelstudy.diagnosis.report.words import verdict_lines
 
 CANNOT = (
     "noise that is slow or differs from hold to hold, or an effect of temperature or time that "
-    "these columns cannot tell"
+    "these columns cannot show"
 )
 
 

@@ -56,7 +56,7 @@ NOT_AN_EFFECT = {"unknown": "something that is not in the catalogue"}
 MIN_SAID = 0.1
 """Posterior from which on something open is worth a word; the page has all of it."""
 MIN_PLACE_SAID = 0.5
-"""Posterior from which on it is worth a word where that which has a name lives."""
+"""Posterior from which on the place of what has a name is worth a word."""
 
 
 def render(part: str, *content: object) -> list[str]:
