@@ -6,12 +6,15 @@ squares are as many as the degrees of freedom. Where squares are fewer without a
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-from scipy import optimize, special, stats
+from numpy.typing import ArrayLike
+from scipy import optimize, special
 
+from accelstudy.adjustment.estimated_variances import probability_beyond, true_variances
 from accelstudy.basics.arrays import Array
 
 POINTS = 50
@@ -26,11 +29,13 @@ class RandomEffects:
     ----------
     values, variances : (n,) arrays
     design : (n, u) array, of rank u
+    variance_dof : (n,) array, degrees of freedom of the variances; infinite where they are known
     """
 
     values: Array
     variances: Array
     design: Array
+    variance_dof: ArrayLike = np.inf
 
     @property
     def dof(self) -> int:
@@ -40,7 +45,9 @@ class RandomEffects:
     @cached_property
     def scatter(self) -> float:
         """Standard deviation of the additional scatter."""
-        return self._scatter_of(self.dof) if self.dof else 0.0
+        if not self.dof or self.squares(0.0) <= self.dof:
+            return 0.0
+        return self._root(lambda scatter: self.dof - self.squares(scatter))
 
     @cached_property
     def estimates(self) -> Array:
@@ -78,20 +85,45 @@ class RandomEffects:
         logs -= np.log(np.abs(np.einsum("suu->su", r))).sum(axis=1)
         return float(special.logsumexp(logs))
 
-    def scatter_interval(self, probability: float = 0.95) -> tuple[float, float]:
-        """Interval of the scatter where its squares are between quantiles of χ².
+    def probability_beyond(self, scatter: float, least: float = 0.0) -> float:
+        """Probability of larger squares where there is this scatter.
 
-        It is that of Viechtbauer (2007, Statistics in Medicine 26, 37).
+        Parameters
+        ----------
+        scatter : float
+        least : float, squares without any scatter, over those that noise leaves on average, that
+            are taken if there are fewer
+        """
+        roots = np.sqrt(self.variances + scatter**2)
+        smooth = self.design @ self.combination(scatter) * roots / roots[:, None]
+        left, share = np.eye(len(roots)) - smooth, self.variances / roots**2
+        dof = np.broadcast_to(self.variance_dof, len(roots))
+        true, means = 1 + share * (true_variances(dof) - 1), np.diag(left)
+        squares = max(self.squares(scatter), least * float(means @ share))
+        return probability_beyond(squares, true, means, left**2)
+
+    def scatter_interval(self, probability: float = 0.95) -> tuple[float, float]:
+        """Interval of the scatter where its squares are between quantiles of their distribution.
+
+        It is that of Viechtbauer (2007, Statistics in Medicine 26, 37), which may be empty, or no
+        more than 0, where squares happen to be few. So its end is never smaller than where they are
+        as many as noise leaves on average (a power-constrained limit, Cowan et al. 2011,
+        arXiv:1105.3166).
         """
         beyond = (1 - probability) / 2
-        low, high = (self._scatter_of(stats.chi2.isf(p, self.dof)) for p in (beyond, 1 - beyond))
-        return low, high
+        return self.scatter_below(beyond), self.scatter_below(1 - beyond, least=1.0)
 
-    def _scatter_of(self, squares: float) -> float:
-        """Scatter with which the weighted squares have a given sum."""
-        if self.squares(0.0) <= squares:
-            return 0.0
-        most = float(np.ptp(self.values))
-        while self.squares(most) > squares:
+    def scatter_below(self, probability: float, least: float = 0.0) -> float:
+        """Bound of the scatter that holds with a probability; `least` as above."""
+
+        def less(scatter: float) -> float:
+            return self.probability_beyond(scatter, least) - probability
+
+        return self._root(less) if less(0.0) < 0 else 0.0
+
+    def _root(self, rising: Callable[[float], float]) -> float:
+        """Scatter at which a function is zero that rises with it, and is negative without any."""
+        most = float(np.ptp(self.values)) + float(np.sqrt(np.max(self.variances)))
+        while rising(most) < 0:
             most *= 4
-        return most * float(optimize.brentq(lambda x: self.squares(x * most) - squares, 0.0, 1.0))
+        return most * float(optimize.brentq(lambda x: rising(x * most), 0.0, 1.0))

@@ -4,27 +4,20 @@ The parameters x of n epochs have the covariance matrices Cᵢ. With stated nois
 of x about their weighted mean are χ² distributed with f = (n − 1) p degrees of freedom if nothing
 changed; of two epochs they are dᵀ (C₁ + C₂)⁻¹ d, with the differences d (Pelzer 1971). Where sigmas
 were estimated, each C is an estimate by r degrees of freedom, and the squares / f are compared with
-F(f, ν).
-
-How the variances of epochs compare is not known: the problem of Behrens & Fisher. An estimate that
-is small by chance makes the squares large, and its own share in them small; degrees of freedom by
-estimated shares (Welch & Satterthwaite) then promise certainty where there is none. So ν is that of
-the F variable with the same quantile as the squares have if the true C are r/χ²(r) times the
-estimated ones (the generalized p-value of Gamage, Mathew & Weerahandi 2004, J. Multivar. Anal. 88,
-177). The level is kept, or not reached, whatever the variances are.
+F(f, ν), where ν is that of `estimated_variances.py`.
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from functools import cache, cached_property
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import ArrayLike
-from scipy import optimize, special, stats
-from scipy.stats import qmc
+from scipy import stats
 
+from accelstudy.adjustment.estimated_variances import dof_of_squares
 from accelstudy.adjustment.quality import noncentrality
 from accelstudy.basics.arrays import Array
 from accelstudy.epochs.file_format import Test
@@ -32,12 +25,6 @@ from accelstudy.positions.choice import first_best
 
 LEVEL = 0.05
 """Level of the test, and of the search for what changed as a whole."""
-POINTS = 10
-"""Binary logarithm of the number of variances that are tried for each estimated one."""
-LIMIT_TOLERANCE = 1e-9
-"""Relative error of the quantile from which ν follows."""
-MANY = 1e9
-"""Degrees of freedom from which on they are infinite."""
 STATISTIC_TOLERANCE = 1e-9
 """Relative difference below which two statistics are equal, and the first one is taken."""
 
@@ -76,7 +63,7 @@ class Congruence:
         n, p = self.estimates.shape
         parts = self._about_the_mean[1].reshape(n, p, n, p)
         means = np.einsum("iaia->i", parts)
-        return (n - 1) * p, dof_of_squares(means, np.einsum("iajb->ij", parts**2), self.dof)
+        return (n - 1) * p, dof_of_squares(means, np.einsum("iajb->ij", parts**2), self.dof, LEVEL)
 
     @cached_property
     def _about_the_mean(self) -> tuple[Array, Array]:
@@ -138,50 +125,6 @@ class Congruence:
         """Place of the parameter without which the others are the most congruent."""
         rest = [self.of([i for i in left if i != one])._squares for one in left]
         return first_best(rest, STATISTIC_TOLERANCE * rest[0])
-
-
-def dof_of_squares(means: Array, products: Array, dof: Array, level: float = LEVEL) -> float:
-    """Degrees of freedom ν of F, where squares have variances that were estimated.
-
-    The squares are zᵀ P z with a projector P = Σ Aₖ of the rank f, in which Aₖ has the variance k.
-    With true variances they are zᵀ (Σ Aₖ / uₖ) z, where uₖ ~ χ²(rₖ)/rₖ are the ratios of estimated
-    and true ones. That is taken as a scaled χ² variable of the same mean and variance, for many u.
-
-    Parameters
-    ----------
-    means : (k,) array, traces of Aₖ
-    products : (k, k) array, traces of Aₖ Aₗ
-    dof : (k,) array, degrees of freedom r of the variances; inf if one was stated
-    level : float, of the quantile that the squares have in common with f times F(f, ν)
-    """
-    if np.isinf(dof).all():
-        return np.inf
-    inverse = 1 / _ratios(tuple(map(float, dof)))
-    f, mean = float(np.sum(means)), inverse @ means
-    scale = np.einsum("nk,kl,nl->n", inverse, products, inverse) / mean
-
-    shape = mean / scale / 2
-    quantiles = 2 * scale * special.gammainccinv(shape, level)
-
-    def too_often(limit: float) -> float:
-        """Probability beyond a limit, less the level."""
-        return float(np.mean(special.gammaincc(shape, limit / scale / 2))) - level
-
-    ends = float(quantiles.min()), float(quantiles.max())
-    limit = optimize.brentq(too_often, *ends, rtol=LIMIT_TOLERANCE) / f
-    nu = float(special.fdtridfd(f, 1 - level, limit))
-    return nu if nu < MANY else np.inf
-
-
-@cache
-def _ratios(dof: tuple[float, ...]) -> Array:
-    """Ratios of estimated and true variances, (2**POINTS, k), evenly in their distributions."""
-    points = qmc.Sobol(len(dof), scramble=False).random_base2(POINTS) + 0.5 / 2**POINTS
-    ratios = np.ones_like(points)
-    for k, r in enumerate(dof):
-        if np.isfinite(r):
-            ratios[:, k] = stats.chi2.ppf(points[:, k], r) / r
-    return ratios
 
 
 def f_tail(statistic: float, p: int, nu: float) -> float:

@@ -4,7 +4,7 @@ Its value in session i at time tᵢ is a + r tᵢ + sᵢ + eᵢ: a line, the sca
 the sd τ, as by switching off and on, and the noise of the calibration.
 
 * It scatters if its squares about the line are more than noise leaves: χ² with stated noise. Where
-  noise was estimated the limit allows for it as that of the congruence test (`congruence.py`).
+  noise was estimated the limit allows for it, as do the ends of its interval.
 * The rate is a t variable with n − 2 degrees of freedom, as the scatter is estimated by the squares
   about the line, whether or not there is scatter (Knapp & Hartung 2003, Statistics in Medicine 22,
   2693; exact where all sigmas are equal).
@@ -26,7 +26,7 @@ from scipy import special, stats
 from accelstudy.adjustment.random_effects import RandomEffects
 from accelstudy.basics.arrays import Array
 from accelstudy.basics.shares import sigmas_95
-from accelstudy.epochs.congruence import LEVEL, dof_of_squares, f_tail
+from accelstudy.epochs.congruence import LEVEL
 from accelstudy.epochs.file_format import Rate, Scatter, Step
 
 YEAR = 365.25 * 86400.0
@@ -48,7 +48,7 @@ class ParameterCourse:
     years : (n,) array, time
     values, variances : (n,) arrays, of the calibrations
     dof : (n,) array, degrees of freedom of the variances; inf if the noise was stated
-    level : float, of what is found, and at which the test of the scatter is exact
+    level : float, of what is found
     """
 
     years: Array
@@ -60,7 +60,7 @@ class ParameterCourse:
     def _level_and(self, *courses: Array) -> RandomEffects:
         """Model of a level, and of changes that follow some courses."""
         design = np.column_stack([np.ones_like(self.years), *courses])
-        return RandomEffects(self.values, self.variances, design)
+        return RandomEffects(self.values, self.variances, design, self.dof)
 
     @cached_property
     def _steps(self) -> list[RandomEffects]:
@@ -121,12 +121,12 @@ class ParameterCourse:
     @cached_property
     def scatter(self) -> Scatter:
         """Scatter about the line, with the step in it where one is sure."""
-        model, root = self.model, np.sqrt(self.variances)
-        smooth = model.design @ model.combination(0.0) * root / root[:, None]
-        left = np.eye(len(root)) - smooth
-        nu = dof_of_squares(np.diag(left), left**2, self.dof, self.level)
-        p_value = f_tail(model.squares(0.0) / model.dof, model.dof, nu)
-        return Scatter(sd=model.scatter, ci95=[*model.scatter_interval()], p_value=p_value)
+        model = self.model
+        return Scatter(
+            sd=model.scatter,
+            ci95=[*model.scatter_interval()],
+            p_value=model.probability_beyond(0.0),
+        )
 
     @property
     def found(self) -> tuple[str, ...]:

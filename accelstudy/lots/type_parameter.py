@@ -73,7 +73,7 @@ class TypeParameter:
     @property
     def scatter_below(self) -> float:
         """Bound below which the scatter is with a probability of 90 %; 0 if one sensor tells it."""
-        return self.of_type.scatter_interval(0.8)[1] if self.of_type.dof else 0.0
+        return self.of_type.scatter_below(0.9) if self.of_type.dof else 0.0
 
     @property
     def in_all(self) -> bool:

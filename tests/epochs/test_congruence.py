@@ -4,8 +4,9 @@ import numpy as np
 import pytest
 from usual import share_tolerance
 
+from accelstudy.adjustment.estimated_variances import dof_of_squares
 from accelstudy.adjustment.quality import POWER
-from accelstudy.epochs.congruence import LEVEL, Congruence, dof_of_squares
+from accelstudy.epochs.congruence import LEVEL, Congruence
 from accelstudy.schemes import get_scheme
 
 N = 1000
@@ -73,9 +74,9 @@ def test_an_unknown_variance_alone_is_that_of_student():
     """Closed forms: one epoch alone has F(p, r); so have two that are sure, with r = ∞."""
     p = np.arange(1, 4)
     for r in (1.0, 5.0, 40.0):
-        found = [dof_of_squares(np.array([k, 0.0]), np.diag([k, 0.0]), (r, 63.0)) for k in p]
+        found = [dof_of_squares(np.array([k, 0]), np.diag([k, 0]), (r, 63.0), LEVEL) for k in p]
         np.testing.assert_allclose(found, r, rtol=0.02)
-    assert np.isinf(dof_of_squares(np.ones(2), np.eye(2), (np.inf, np.inf)))
+    assert np.isinf(dof_of_squares(np.ones(2), np.eye(2), (np.inf, np.inf), LEVEL))
 
 
 @pytest.mark.parametrize(("dof", "least"), [(np.inf, POWER), (63, 0.95 * POWER), (15, 0.7)])

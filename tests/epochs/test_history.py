@@ -16,7 +16,7 @@ N = 500
 DATES = np.array([-2.1, -1.7, -1.0, -0.6, -0.5, 0.0])
 """Years."""
 EQUAL, UNEQUAL = np.full(6, 0.7), np.array([0.5, 1.5, 0.8, 1.0, 2.0, 0.6])
-STATED = np.full(6, np.inf)
+STATED, FEW = np.full(6, np.inf), np.full(6, 4.0)
 
 
 def drawn(seed, sigmas, *, n=N, rate=0.0, course=DATES, scatter=0.0, dof=STATED):
@@ -48,16 +48,25 @@ def test_what_is_not_there_is_found_no_more_often_than_is_said(sigmas, dof):
         assert least <= np.mean(found) <= LEVEL + share_tolerance(LEVEL, n)
 
 
-@pytest.mark.parametrize(("sigmas", "scatter"), [(EQUAL, 0.0), (UNEQUAL, 0.5), (UNEQUAL, 5.0)])
-def test_intervals_hold_rate_and_scatter(sigmas, scatter):
-    """Without scatter the interval of the rate is wider than it need be: nobody knows."""
-    drifting = drawn(2, sigmas, rate=0.4, scatter=scatter)
+@pytest.mark.parametrize(("sigmas", "scatter", "dof"), [
+    (EQUAL, 0.0, STATED), (UNEQUAL, 0.5, STATED), (UNEQUAL, 5.0, STATED), (UNEQUAL, 0.0, FEW),
+    (EQUAL, 5.0, FEW),
+])  # fmt: skip
+def test_intervals_hold_rate_and_scatter(sigmas, scatter, dof):
+    """Without scatter the interval of the rate is wider than it need be: nobody knows.
+
+    As if estimated sigmas were known, the interval held no scatter in 0.88; in 1 of 40 of known
+    sigmas it ended at zero.
+    """
+    drifting = drawn(2, sigmas, rate=0.4, scatter=scatter, dof=dof)
     rates, (low, high) = np.moveaxis([(c.rate.ci95, c.scatter.ci95) for c in drifting], 0, -1)
-    held = np.mean((low <= scatter) & (scatter <= high))
     off = share_tolerance(0.05, N)
-    assert held == pytest.approx(0.975 if scatter == 0 else 0.95, abs=off)
-    held = np.mean((rates[0] < 0.4) & (rates[1] > 0.4))
-    assert 0.95 - off <= held <= (0.95 + off if scatter == 5 else 1)
+    for held in (
+        np.mean((low <= scatter) & (scatter <= high)),
+        np.mean((rates[0] < 0.4) & (rates[1] > 0.4)),
+    ):
+        assert 0.95 - off <= held <= (0.95 + off if scatter == 5 else 1)
+    assert np.all(high > 0)
 
 
 def test_a_step_is_no_drift_and_neither_drift_nor_scatter_is_a_step():
