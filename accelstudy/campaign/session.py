@@ -28,9 +28,10 @@ def _of_holds(attribute: str) -> cached_property[Any]:
     names = COLUMNS[attribute].names
 
     def array(campaign: Campaign) -> Any:
-        if names[0] not in campaign.holds:
+        holds = campaign.holds
+        if names[0] not in holds:
             return None
-        columns = [campaign.holds[name].to_numpy()[campaign.used] for name in names]
+        columns = [holds[name].to_numpy()[campaign.used] for name in names]
         array = np.column_stack(columns) if len(names) > 1 else columns[0]
         array.setflags(write=False)  # a change would not reach the table
         return array
@@ -164,13 +165,14 @@ class Campaign:
     @cached_property
     def hold(self) -> HoldConditions:
         """Conditions of the holds, such as time and temperature, as the effects take them."""
-        known = [name for name in HoldConditions.columns() if name in self.holds]
-        conditions: dict[str, Any] = {name: self.holds[name].to_numpy() for name in known}
+        holds = self.holds
+        known = [name for name in HoldConditions.columns() if name in holds]
+        conditions: dict[str, Any] = {name: holds[name].to_numpy() for name in known}
         if self.header.robot is not None:  # without its yaw, that is 0
-            conditions.setdefault("yaw", np.zeros(len(self.holds)))
+            conditions.setdefault("yaw", np.zeros(len(holds)))
         session = HoldConditions(**conditions, full_range=self.header.range_mps2)
         # The position before a hold acts on it, whether that position is used or not.
-        forces = self.holds[[*COLUMNS["forces"].names]].to_numpy()
+        forces = np.column_stack([holds[name].to_numpy() for name in COLUMNS["forces"].names])
         return session.with_steps(forces).take(np.flatnonzero(self.used))
 
     @property
