@@ -27,7 +27,7 @@ export OPENBLAS_NUM_THREADS := 1
 export OMP_NUM_THREADS := 1
 export MKL_NUM_THREADS := 1
 
-.PHONY: help env test golden golden-renew coverage test-processors test-processors-part test-breaks smoke reproduce anew unlock report positions hidden-effects hidden-docs real-noise optimal-schemes pictures benchmarks docs wheel lint lock clean
+.PHONY: help env test tests golden golden-renew coverage test-processors test-processors-part test-breaks smoke reproduce anew unlock report positions hidden-effects hidden-docs real-noise optimal-schemes pictures benchmarks docs wheel lint style types lock clean
 
 help: ## list the targets
 	@awk -F ':.*## ' '/^[a-z-]+:.*## / { printf "%-18s%s\n", $$1, $$2 }' Makefile
@@ -37,7 +37,11 @@ help: ## list the targets
 
 env: $(READY) ## make the environment, from locked versions, in .venv
 
-test: lint ## check and test the package
+# What is quick comes first; types are checked beside the tests, which alone leave a core idle.
+test: style ## check and test the package
+	$(MAKE) --jobs 2 types tests
+
+tests: $(READY)
 	$(TEST)
 
 # Of all parts in tests/golden, or of PART; `make test` compares those that take a minute together.
@@ -117,11 +121,15 @@ wheel: $(READY) ## build the package in dist/, with the workflow in it
 	python -m hatchling build --target wheel
 
 # Snakemake's own check of the workflows is a test, as starting it takes longer.
-lint: $(READY) ## check style and types
+lint: style types ## check style and types
+
+style: $(READY)
 	ruff check
 	ruff format --check
-	mypy
 	snakefmt --check Snakefile workflow studies accelstudy/study/template
+
+types: $(READY)
+	mypy
 
 lock: $(READY) ## lock the newest versions that pyproject.toml allows
 	uv lock --upgrade --default-index https://pypi.org/simple
