@@ -164,7 +164,7 @@ class FoundEffect(Part):
     ----------
     name : name
     spec : name with its settings
-    position : number of a bumped position; null of all else
+    position : number of an outlier position; null of all else
     equivalence_class : names that mean the same in these positions
     posterior : of the explanation; null of what has no rivals
     parameters : of an effect

@@ -113,9 +113,9 @@ class CampaignDiagnosis:
 
     @cached_property
     def final_fit(self) -> CampaignFit:
-        """The calibration with what was found, without positions that were found to be bumped."""
-        bumped = self.campaign.positions[~self.used_positions].tolist()
-        reasons = dict.fromkeys(bumped, "bumped, as the diagnosis found")
+        """The calibration with what was found, without positions that were found to be outliers."""
+        outliers = self.campaign.positions[~self.used_positions].tolist()
+        reasons = dict.fromkeys(outliers, "an outlier, as the diagnosis found")
         return CampaignFit(self.campaign.without(reasons), self.final.solution)
 
     # --- the verdict --------------------------------------------------------------------------
@@ -158,9 +158,9 @@ class CampaignDiagnosis:
 
     @cached_property
     def used_positions(self) -> NDArray[np.bool_]:
-        """Which positions, (n,), the final fit uses: all but those that were found to be bumped."""
-        bumped = [named.position for named in self.found if named.position is not None]
-        return ~np.isin(self.campaign.positions, bumped)
+        """Which positions, (n,), the final fit uses: all but outliers that were found."""
+        outliers = [named.position for named in self.found if named.position is not None]
+        return ~np.isin(self.campaign.positions, outliers)
 
     def _noise(self) -> FoundEffect:
         """What is wrong with the noise."""
@@ -211,7 +211,7 @@ class CampaignDiagnosis:
         posterior, first = self.finding.posterior, dict[tuple[str, ...], str]()
         total: dict[str, float] = defaultdict(float)
         for one in posterior.all:
-            # Two bumped positions have one name.
+            # Two outlier positions have one name.
             names = {first.setdefault(cause.members, cause.name): None for cause in one.causes}
             for name in names:
                 total[name] += one.posterior

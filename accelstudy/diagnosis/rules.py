@@ -1,7 +1,7 @@
 """The rules by which a diagnosis decides: each prior, level and threshold, with its reason.
 
 Prior weights are relative to "one effect is missing", which weighs 1; the classes of effects and a
-bumped position share it evenly. Each diagnosis.json quotes the rules that it was made by.
+outlier position share it evenly. Each diagnosis.json quotes the rules that it was made by.
 """
 
 from dataclasses import dataclass
@@ -17,7 +17,7 @@ class Rules:
 
     prior_two: float = 0.15
     """Two effects are missing: of the models that lack something one in eight lacks more. Likewise
-    another bumped position, where one was bumped."""
+    another outlier position, where there is one."""
     prior_unknown: float = 0.06
     """Something is missing that is not in the catalogue, which has the usual effects."""
     prior_coloured: float = 0.06

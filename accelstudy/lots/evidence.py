@@ -42,7 +42,7 @@ class SensorEvidence:
     ----------
     campaign : str
     p_value : float, of anything missing in this campaign alone
-    odds : dict of name to log odds: an effect, a kind of noise, a bumped position, or "unknown"
+    odds : dict of name to log odds: an effect, a kind of noise, an outlier position, or "unknown"
         with the coordinate and the target that something without a name has
     classes : tuple of tuple of str, names that mean the same in this campaign
     specs : dict of effect to its best setting

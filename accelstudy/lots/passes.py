@@ -250,7 +250,7 @@ class Pass:
 
     @cached_property
     def _rare(self) -> set[str]:
-        """Classes of no type: what few sensors have, if the lot has it, and bumped positions."""
+        """Classes of no type: what few sensors have, if the lot has it, and outlier positions."""
         having = {name: np.sum(e.having > MIN_HAVING) for name, e in self.mixture.effects.items()}
         return {name for name, n in having.items() if n <= self._few or name == OUTLIER}
 

@@ -251,7 +251,7 @@ def test_of_many_wrong_positions_the_first_are_named():
     assert len(str(e.value)) < 400
 
 
-def test_a_bias_that_no_sensor_has_is_not_taken_for_bumped_positions():
+def test_a_bias_that_no_sensor_has_is_not_taken_for_outlier_positions():
     """Its positions are far from those of a usual sensor, and yet all agree."""
     rng = np.random.default_rng(1)
     for _ in range(20):

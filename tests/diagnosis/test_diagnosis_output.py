@@ -242,7 +242,7 @@ def test_positions_say_what_was_held_out(written):
 
 
 @pytest.mark.usefixtures("composed")
-def test_a_bumped_position_is_left_out(tmp_path):
+def test_an_outlier_position_is_left_out(tmp_path):
     campaign = simulated("no_effect", tmp_path / "c")
     campaign = gross.bumped(campaign, 8, (0.05, -0.04, 0.06))
     diagnosis = diagnose(campaign, NINE)

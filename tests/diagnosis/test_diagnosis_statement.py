@@ -73,7 +73,7 @@ def made(*explanations):
     # a rival that hardly matters belongs to what is certain, but not to its names
     ([("bias_drift", 0.6), ("warm_up", 0.32), ("thermal_bias", 0.05)],
      [(SLOW, {"bias_drift": 0.6, "warm_up": 0.32})], []),
-    # two bumped positions count once
+    # two outlier positions count once
     ([("outlier_position+outlier_position", 0.6), ("outlier_position", 0.35)],
      [("", {"outlier_position": 0.95})], []),
     # too little is not certain

@@ -272,7 +272,7 @@ def test_a_sensor_is_odd_though_a_second_one_shows_the_same_by_chance():
     assert [(o.campaign, o.names) for o in one.odd.values()] == [("sensor 9", [NAMES[1]])]
 
 
-def test_a_bumped_position_belongs_to_no_type_however_many_have_one():
+def test_an_outlier_position_belongs_to_no_type_however_many_have_one():
     odds = np.full((12, 3), -1.0)
     odds[[2, 7, 9], 1] = 15.0
     one = weighed(odds, np.random.default_rng(8), (NAMES[0], OUTLIER, NAMES[2]))

@@ -122,7 +122,7 @@ def test_what_depends_on_more_than_the_attitude(begun):
 # --- conflicts -----------------------------------------------------------------------------------
 
 
-def test_a_bumped_position_is_named_and_to_be_repeated(begun):
+def test_an_outlier_position_is_named_and_to_be_repeated(begun):
     folder = begun(30, bumped=[17])
     text = advise(folder)
     assert "position 30: agrees with the others" in text

@@ -56,7 +56,7 @@ MIN_ANGLE_UNIT_RATIO = 2.0
 MIN_SHIFTED_SHARE = 0.5
 """Share of the exchanged rows that belong one row further, above which the table has slipped."""
 MIN_POSITIONS_PER_OUTLIER = 8
-"""At most one of so many positions may be bumped; if more are off, something else is wrong."""
+"""At most one of so many positions may be an outlier; if more are off, something else is wrong."""
 
 
 @dataclass(frozen=True)
@@ -77,7 +77,7 @@ class Recognition:
 
     @property
     def names(self) -> tuple[tuple[str, int | None], ...]:
-        """Names of the errors, each once, and the number of each bumped position."""
+        """Names of the errors, each once, and the number of each outlier position."""
         named = [
             (error.name, place) for error in self.errors for place in error.left_out or (None,)
         ]
@@ -192,7 +192,7 @@ def check_plausible(campaign: Campaign, where: str, angle_unit: str = "gon") -> 
 
 
 def recognise(campaign: Campaign, attitude: bool = True) -> Recognition | None:
-    """Recognise wrong units, swapped axes, exchanged rows and bumped positions, if they are gross.
+    """Recognise wrong units, swapped axes, exchanged rows and outlier positions, if they are gross.
 
     Without the angles of a robot, exchanged rows and swapped axes do not show, as they leave the
     norm of the force as it is; but those of counts do, before their scales and offsets.
@@ -418,15 +418,18 @@ def outliers(sensor: RealSensor) -> Iterator[Correction]:
     """Leave out positions that are so wrong that they would spoil a calibration."""
     campaign = sensor.campaign
     far = sensor.wrong & (sensor.distance > MAX_USABLE_ERROR * sensor.gravity)
-    bumped = tuple(campaign.positions[far].tolist())
-    if not sensor.tells or not 0 < len(bumped) <= campaign.n_positions // MIN_POSITIONS_PER_OUTLIER:
+    outliers = tuple(campaign.positions[far].tolist())
+    if (
+        not sensor.tells
+        or not 0 < len(outliers) <= campaign.n_positions // MIN_POSITIONS_PER_OUTLIER
+    ):
         return
     # Far from a usual sensor, and yet all may fit one whose bias or scale no sensor has.
     if sensor.free.distance.max() < MIN_POSITION_ERROR * sensor.gravity:
         return
-    positions, size = short_list([*map(str, bumped)]), sensor.distance[far].max()
+    positions, size = short_list([*map(str, outliers)]), sensor.distance[far].max()
     reason = f"positions {positions} are wrong by up to {size:.2g} m/s^2"
-    if len(bumped) == 1:
+    if len(outliers) == 1:
         reason = f"position {positions} is wrong by {size:.2g} m/s^2"
-    without = campaign.without(dict.fromkeys(bumped, reason))
-    yield Correction("outlier_position", reason, without, left_out=bumped)
+    without = campaign.without(dict.fromkeys(outliers, reason))
+    yield Correction("outlier_position", reason, without, left_out=outliers)

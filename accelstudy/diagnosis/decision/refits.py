@@ -1,4 +1,4 @@
-"""Fits of the model with effects added and bumped positions left out."""
+"""Fits of the model with effects added and outlier positions left out."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ RANGE_FACTOR = 1.6
 
 
 def refit(base: Solution, chosen: Sequence[Hypothesis]) -> Solution | None:
-    """Fit with effects added and bumped positions left out; None if it has no solution."""
+    """Fit with effects added and outlier positions left out; None if it has no solution."""
     effects = [h.distinguishable for h in chosen if h.outlier is None]
     together = (*base.model.effects, *effects)
     try:
@@ -41,9 +41,9 @@ def refit(base: Solution, chosen: Sequence[Hypothesis]) -> Solution | None:
     # Started from an ideal sensor, the iterations may not reach a large effect.
     start = dict(zip(base.model.parameter_names, base.parameters, strict=False))
     observed = replace(base.observed, initial=model.vector(start))
-    bumped = [h.outlier for h in chosen if h.outlier is not None]
-    if bumped:
-        observed = observed.take(np.setdiff1d(np.arange(len(base.misclosures)), bumped))
+    outliers = [h.outlier for h in chosen if h.outlier is not None]
+    if outliers:
+        observed = observed.take(np.setdiff1d(np.arange(len(base.misclosures)), outliers))
     try:
         solution = solve(model, base.approach, observed)
     except (InputError, np.linalg.LinAlgError):

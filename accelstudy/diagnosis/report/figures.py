@@ -67,7 +67,7 @@ def residual_figure(diagnosis: CampaignDiagnosis, positions: pd.DataFrame) -> Fi
     panels = _panels(d, positions, len(names))
     rows = ("before",) if d.final is d.frame else ("before", "after")
     figure = new_figure(FULL, 12 + 46 * len(rows))
-    # The scale of a bumped position would hide all others.
+    # The scale of an outlier position would hide all others.
     sharey: Literal["all", "row"] = "row" if d.extended_model is d.model else "all"
     grid = figure.subplots(len(rows), len(panels), sharey=sharey, sharex="col", squeeze=False)
     # Labels of narrow panels must not meet.

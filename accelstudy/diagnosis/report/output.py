@@ -206,7 +206,7 @@ class Diagnosis(Result):
         -------
         position, time_s, roll_gon, pitch_gon, temperature_degC : what was measured; NaN if it was
             not
-        split : "fit", "held-out", or "left out" of the final fit as bumped
+        split : "fit", "held-out", or "left out" of the final fit as an outlier
         residual_*_before_mps2, residual_*_after_mps2 : what the readings lack of the conditions, by
             the base fit and by the final one: the output less that in the robot's attitude, or the
             norm of f_b less gravity

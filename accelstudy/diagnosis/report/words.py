@@ -44,7 +44,7 @@ FAMILIES = {
     "": "an effect",
     "alignment of the axes": "a misalignment of the axes",
     "attitude of the rig": "an error in the attitude of the rig",
-    "gross error": "a bumped position",
+    "gross error": "an outlier position",
     "linear scale": "an error of the linear scale",
     "noise": "noise of another kind",
     "temperature": "an effect of temperature",

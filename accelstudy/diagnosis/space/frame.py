@@ -163,7 +163,7 @@ class SessionFit:
 
     @cached_property
     def tested(self) -> Candidates:
-        """The effects that are not in the model, and bumped positions."""
+        """The effects that are not in the model, and outlier positions."""
         modelled = {*self.solution.model.effect_names}
         by_sensor, redundancy = self.solution.observed.angle_errors, self.residuals.redundancy
         shapes, invisible, untestable = dict[str, Hypotheses](), [], {}
@@ -189,8 +189,8 @@ class SessionFit:
                 )
             else:
                 invisible.append(name)
-        if bumped := outlying_positions(self.residuals):
-            shapes[OUTLIER] = Hypotheses.of(bumped)
+        if outliers := outlying_positions(self.residuals):
+            shapes[OUTLIER] = Hypotheses.of(outliers)
         return Candidates(shapes, tuple(invisible), untestable)
 
     @property

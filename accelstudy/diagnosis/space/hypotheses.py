@@ -1,6 +1,6 @@
 """Everything that may be missing: alternatives, each with a covariance of the residuals.
 
-An effect in one of its shapes, or a bumped position, is a space of residuals, K = Q Qᵀ/l: nothing
+An effect in one of its shapes, or an outlier position, is a space of residuals, K = Q Qᵀ/l: nothing
 is known of its l parameters. A smooth function of a coordinate has a covariance of its own
 (`accelstudy.diagnosis.space.shapes`). Of unknown size, each adds λ K to that of the noise.
 """
@@ -30,7 +30,7 @@ OUTLIER = "outlier_position"
 
 
 class _Shift(Effect):
-    """What a bumped position has in place of an effect: nothing that a model could have."""
+    """What an outlier position has in place of an effect: nothing that a model could have."""
 
     name, parameters = OUTLIER, ()
 
@@ -49,7 +49,7 @@ class Hypothesis:
     directions : (k, l) array, combinations of the parameters that the positions show
     basis : (m, l) array, orthonormal, of the space of its signature in the residuals
     ideal : (m, l) array, likewise for an ideal sensor, at which equal effects are exactly equal
-    outlier : int, index of the position that was bumped; None for an effect
+    outlier : int, index of the outlier position; None for an effect
     estimates : (l, l) array, turns products of the basis with residuals into the l parameters that
         show most; None for effects whose parameters have no bounds
     """
@@ -146,7 +146,7 @@ class Spaces(Shapes):
 
 @dataclass(frozen=True)
 class Hypotheses(Spaces):
-    """Spaces that are hypotheses with a name: the shapes of an effect, or all bumped positions.
+    """Spaces that are hypotheses with a name: the shapes of an effect, or all outlier positions.
 
     Attributes
     ----------
