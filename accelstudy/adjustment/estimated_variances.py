@@ -57,7 +57,7 @@ def _ratios(dof: tuple[float, ...]) -> Array:
 def _scaled(true: Array, means: Array, products: Array) -> tuple[Array, Array]:
     """Scale (n,) of χ² and half its degrees of freedom (n,), for true variances (n, k)."""
     mean = true @ means
-    scale = np.einsum("nk,kl,nl->n", true, products, true) / mean
+    scale = np.sum(true @ products * true, axis=1) / mean
     return scale, mean / scale / 2
 
 
@@ -92,7 +92,7 @@ def dof_of_squares(means: Array, products: Array, dof: Array, level: float) -> f
 
     def too_often(limit: float) -> float:
         """Probability beyond a limit, less the level."""
-        return probability_beyond(limit, true, means, products) - level
+        return float(np.mean(special.gammaincc(half, limit / scale / 2))) - level
 
     ends = float(quantiles.min()), float(quantiles.max())
     limit = optimize.brentq(too_often, *ends, rtol=LIMIT_TOLERANCE) / f

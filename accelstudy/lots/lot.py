@@ -2,17 +2,11 @@
 
 from __future__ import annotations
 
-import ctypes
 import math
-import signal
-import sys
-from collections.abc import Callable, Iterable, Iterator, Sequence
-from concurrent.futures import ProcessPoolExecutor
-from concurrent.futures.process import BrokenProcessPool
-from contextlib import contextmanager, suppress
+from collections.abc import Callable, Iterable, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, replace
-from functools import cached_property, partial
-from multiprocessing import active_children, get_context
+from functools import cached_property
 from typing import TypeAlias
 
 import numpy as np
@@ -22,7 +16,8 @@ from accelstudy.diagnosis.decision.problem import BaseFit
 from accelstudy.lots.evidence import Sensor, SensorEvidence
 from accelstudy.lots.file_format import Alternative, OddSensor, SensorState
 from accelstudy.lots.noise import NoisePrior, noises_of_lot
-from accelstudy.lots.passes import LEVEL, MIN_HAVING, LotEffect, Mapped, Pass, find_odd
+from accelstudy.lots.passes import LEVEL, MIN_HAVING, LotEffect, Pass, find_odd
+from accelstudy.lots.processes import processes
 from accelstudy.sensors.models import get_model
 from accelstudy.sensors.sensor import SensorModel
 
@@ -31,8 +26,6 @@ Weighing: TypeAlias = Callable[[Sequence[LotEffect]], Pass]
 
 LEVEL_OF_REST = 0.01
 """Level of the test whether the model of a lot lacks more than what was found."""
-END_WITH_PARENT = 1
-"""Option of prctl(2) by which a process gets a signal when its parent ends, PR_SET_PDEATHSIG."""
 ODD = "odd"
 """Name of an effect that one sensor has, and neither the model nor the other sensors."""
 MAX_EFFECTS = 3
@@ -145,7 +138,7 @@ def weigh_lot(sensors: Sequence[Sensor], cores: int = 1) -> LotDiagnosis:
         If a process is killed.
     """
     model = sensors[0].model
-    with _processes(cores, len(sensors)) as mapped:
+    with processes(cores, len(sensors)) as mapped:
         passes, effects = [Pass.of(sensors, mapped)], list[LotEffect]()
 
         def weigh_with(effects: Sequence[LotEffect]) -> Pass:
@@ -226,39 +219,3 @@ def sensors_with(effects: Sequence[LotEffect], sensors: Sequence[Sensor]) -> lis
 def extended(model: SensorModel, specs: Iterable[str]) -> SensorModel:
     """Model with further effects."""
     return get_model("+".join((*(effect.spec for effect in model.effects), *specs)))
-
-
-@contextmanager
-def _processes(cores: int, n: int) -> Iterator[Mapped]:
-    """What maps a function over n campaigns, in as many processes as there are cores.
-
-    Elsewhere than on Linux processes start anew, with all imports; there is one.
-    """
-    cores = min(cores, n)
-    if cores == 1 or sys.platform != "linux":
-        yield map
-        return
-    others = {*active_children()}
-    with ProcessPoolExecutor(cores, get_context("fork"), _work) as pool:
-        try:
-            yield partial(pool.map, chunksize=min(4, -(-n // cores)))
-        except BrokenProcessPool:
-            raise InputError(
-                "a process of the lot was killed, most likely because memory ran out; "
-                "use fewer `cores`"
-            ) from None
-        except BaseException:
-            for worker in {*active_children()} - others:
-                worker.kill()
-            raise
-
-
-def _work() -> None:
-    """Let a worker end with the process that it works for, which alone answers to Ctrl-C.
-
-    Handlers that the program has for SIGTERM are no matter of a worker: it would outlive the signal
-    by which the pool ends it.
-    """
-    signal.signal(signal.SIGINT, signal.SIG_IGN)
-    signal.signal(signal.SIGTERM, signal.SIG_DFL)
-    ctypes.CDLL(None).prctl(END_WITH_PARENT, signal.SIGKILL)

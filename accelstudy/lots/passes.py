@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import TYPE_CHECKING, Any, NamedTuple, TypeAlias
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 from scipy import special, stats
@@ -22,13 +22,11 @@ from accelstudy.effects import get_effect
 from accelstudy.lots.evidence import NOISE_PRIORS, Sensor, SensorEvidence, lot_classes
 from accelstudy.lots.file_format import Alternative, OddSensor
 from accelstudy.lots.mixture import Mixture
+from accelstudy.lots.processes import Mapped
 from accelstudy.lots.sizes import LotResiduals, ShownEffect
 
 if TYPE_CHECKING:
     from accelstudy.lots.type_parameter import TypeParameter
-
-Mapped: TypeAlias = Callable[..., Iterator[Any]]
-"""Maps a function over sensors, in one process or in several."""
 
 LEVEL = 0.05
 """Level of the test whether anything is missing in a lot: half of it by what each campaign says of

@@ -14,12 +14,12 @@ ENOUGH = 60
 CODE = """
 import os, signal, time
 from accelstudy.commands.ending import interruptible
-from accelstudy.lots.lot import _processes
+from accelstudy.lots.processes import processes
 signal.signal(signal.SIGINT, signal.default_int_handler)
 def endless(campaign):
     os.write(1, b"at work\\n")
     time.sleep(1000)
-with interruptible(), _processes(3, 3) as mapped:
+with interruptible(), processes(3, 3) as mapped:
     list(mapped(endless, range(3)))
 """
 
@@ -47,7 +47,7 @@ def test_no_worker_stays_and_none_says_a_word(name):
 
 PROGRAM = """
 import os, signal, time
-from accelstudy.lots.lot import _processes
+from accelstudy.lots.processes import processes
 signal.signal(signal.SIGTERM, lambda *_: os.write(1, b"handled\\n"))
 def job(campaign):
     if campaign == "killed":
@@ -55,10 +55,10 @@ def job(campaign):
     time.sleep(1000 if campaign == "endless" else 0)
     return campaign
 for _ in range(30):
-    with _processes(3, 5) as mapped:
+    with processes(3, 5) as mapped:
         assert list(mapped(job, range(5))) == [0, 1, 2, 3, 4]
 try:
-    with _processes(3, 3) as mapped:
+    with processes(3, 3) as mapped:
         list(mapped(job, ["endless", "endless", "killed"]))
 except ValueError as error:
     print(error, flush=True)
