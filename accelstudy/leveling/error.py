@@ -65,7 +65,8 @@ def attitudes_in_use(
     """
     f_b = cap_forces(max_tilt, ATTITUDES, g)
     roll, pitch = roll_pitch(tuple(f_b.T))
-    used = hold.take(np.arange(len(f_b)) % len(hold.column("order")))
+    # All positions count alike, however many there are.
+    used = hold.take(np.arange(len(f_b)) * len(hold.column("order")) // len(f_b))
     yaw = np.zeros(len(f_b)) if used.yaw is None else used.yaw
     return f_b, replace(used, roll=roll, pitch=pitch, yaw=yaw)
 

@@ -6,8 +6,9 @@ from leveling_helpers import leveling_error
 from usual import NINE, PAPER, PAPER_TRUTH, G
 
 from accelstudy.basics.units import GON, MGON
-from accelstudy.leveling.angles import roll_pitch
-from accelstudy.leveling.error import ATTITUDES, cap_forces, tilt_error
+from accelstudy.effects import HoldConditions
+from accelstudy.leveling.angles import angles_of
+from accelstudy.leveling.error import ATTITUDES, attitudes_in_use, cap_forces, tilt_error
 from accelstudy.sensors.models import compose
 
 # What the gravity-based calibration of 24 positions leaves.
@@ -16,24 +17,16 @@ BIAS = compose("bias", ("bias",))
 CUBIC = compose("cubic", ("bias", "scale", "nonorthogonality", "cubic_scale"))
 
 
-def angles_of(f):
-    return np.stack(roll_pitch(tuple(np.moveaxis(f, -1, 0))), axis=-1)
-
-
 def brute_force(simulated, truth, estimated, estimates, f_b, g=G):
     """Level every attitude with every calibration, without any linearisation; rms (R, 2)."""
     output = simulated.sense(f_b, truth, g)
-    corrected = estimated.correct(
-        np.broadcast_to(output, (len(estimates), *f_b.shape)), estimates, g
-    )
-    error = angles_of(corrected) - angles_of(f_b)
-    error = (error + np.pi) % (2 * np.pi) - np.pi
+    outputs = np.broadcast_to(output, (len(estimates), *f_b.shape))
+    error = angles_of(estimated.correct(outputs, estimates, g)) - angles_of(f_b)
     return np.sqrt(np.mean(error**2, axis=1))
 
 
-def estimates_about(center, sigma, replicates=200, seed=1):
-    draws = np.random.default_rng(seed).standard_normal((replicates, len(center)))
-    return center + sigma * draws
+def estimates_about(center, sigma):
+    return center + sigma * np.random.default_rng(1).standard_normal((200, len(center)))
 
 
 # --- attitudes -----------------------------------------------------------------------------------
@@ -66,6 +59,14 @@ def test_the_mean_over_attitudes_is_that_over_the_cap(tilt, digits):
     roll, pitch = error.rms_of_all(sigma**2 * np.eye(3))
     assert pitch == pytest.approx(sigma / 9.81, rel=1e-12)
     assert roll == pytest.approx(sigma / 9.81 * np.sqrt(-np.log(z) / (1 - z)), rel=digits)
+
+
+def test_all_positions_of_a_calibration_count_alike():
+    """Of 5000 positions in which a sensor grew warm, the first 200 counted."""
+    for n in (7, 180, 5000):
+        order = np.linspace(0, 1, n)
+        used = attitudes_in_use(HoldConditions(order=order), G)[1].order
+        assert np.mean(used**2) == pytest.approx(np.mean(order**2), rel=0.02)
 
 
 # --- brute force ---------------------------------------------------------------------------------
