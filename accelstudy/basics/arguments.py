@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import re
 from collections.abc import Callable, Mapping, Sequence
 from io import IOBase
@@ -84,7 +85,7 @@ def paths_of(given: Any, what: str, wanted: Callable[[str], bool]) -> list[Any]:
         raise InputError(f"expected one {what} or several")
     seen = set()
     for path in (one for one in each if isinstance(one, str | PathLike)):
-        if (place := Path(path).resolve()) in seen:
+        if (place := os.path.realpath(path)) in seen:
             raise InputError(f"{path}: is given twice; each {what} counts once")
         seen.add(place)
     return each

@@ -13,9 +13,6 @@ import click
 
 from accelstudy.basics.errors import InputError
 
-INTERRUPTED = 130
-"""Exit status of a command that Ctrl-C ended, by the convention of shells."""
-
 
 @contextmanager
 def bad_input_as_one_line() -> Iterator[None]:
@@ -34,32 +31,34 @@ def bad_input_as_one_line() -> Iterator[None]:
 
 @contextmanager
 def interruptible() -> Iterator[None]:
-    """End with one line where Ctrl-C comes, whatever a library makes of it.
+    """End with one line where Ctrl-C or SIGTERM comes, whatever a library makes of it.
 
-    Some report it as an error of their own: pandas as one of the file that it reads, numpy as one
-    of its import.
+    What was begun is removed, and the exit status is that of shells, 128 and the number of the
+    signal. Some libraries report it as an error of their own: pandas as one of the file that it
+    reads, numpy as one of its import.
     """
-    came = False
+    came = None
 
     def stop(number: int, frame: FrameType | None) -> NoReturn:
         nonlocal came
-        came = True
+        came = number
         raise KeyboardInterrupt
 
-    before = signal.getsignal(signal.SIGINT)
-    ours = before is not signal.SIG_IGN and current_thread() is main_thread()
-    if ours:
-        signal.signal(signal.SIGINT, stop)
+    numbers = (signal.SIGINT, signal.SIGTERM) if current_thread() is main_thread() else ()
+    handlers = {number: signal.getsignal(number) for number in numbers}
+    before = {number: own for number, own in handlers.items() if own is not signal.SIG_IGN}
+    for number in before:
+        signal.signal(number, stop)
     try:
         yield
     except (Exception, KeyboardInterrupt) as error:
-        if not came and not isinstance(error, KeyboardInterrupt):
+        if came is None and not isinstance(error, KeyboardInterrupt):
             raise
         click.echo("interrupted", err=True)
-        raise SystemExit(INTERRUPTED) from None
+        raise SystemExit(128 + (came or signal.SIGINT)) from None
     finally:
-        if ours:
-            signal.signal(signal.SIGINT, before)
+        for number, handler in before.items():
+            signal.signal(number, handler)
 
 
 def _end(message: str) -> NoReturn:

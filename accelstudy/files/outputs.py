@@ -71,11 +71,12 @@ class OutputKind:
         out = Path(out)
         with _disk_errors_named(out):
             _check_apart(out, inputs)
-            is_earlier_result = _check_folder(out, self, force)
+            _check_folder(out, self, force)
             with _staging(out, out, "new") as new:
                 new.mkdir()
                 yield new
-                _publish(new, out.resolve(), self, is_earlier_result)
+                # Somebody else may have written there in the meantime.
+                _publish(new, Path(os.path.realpath(out)), self, _check_folder(out, self, force))
 
 
 DIAGNOSIS = OutputKind(
@@ -211,8 +212,9 @@ def _staging(near: Path, out: Path, name: str) -> Iterator[Path]:
     The name of the folder cannot be predicted, so nobody can place a link there. Errors name `out`
     instead of the path.
     """
-    folder = next(path for path in (near, *near.absolute().parents) if path.exists())
-    if not folder.is_dir():
+    near = Path(os.path.realpath(near))
+    folder = next(path for path in (near, *near.parents) if os.path.lexists(path))
+    if not folder.is_dir():  # a file, or a link to itself
         raise NotADirectoryError(ENOTDIR, f"{folder} is not a folder")
     with TemporaryDirectory(
         prefix=_PREFIX, suffix=".part", dir=folder, ignore_cleanup_errors=True
@@ -238,7 +240,7 @@ def _disk_errors_named(out: Path) -> Iterator[None]:
 
 
 def _check_apart(out: Path, inputs: Iterable[str | Path]) -> None:
-    place = out.resolve()
+    place = Path(os.path.realpath(out))
     for source in map(Path, inputs):
         if not (source.is_file() or source.is_dir()):
             continue  # the reader reports what is not there, and a pipe is nowhere on the disk

@@ -34,7 +34,8 @@ def new_study(folder: Path, force: bool = False) -> str:
     InputError
         If the folder is not empty, or cannot be written.
     """
-    name = re.sub(r"(?a)[\W_]+", "-", folder.resolve().name).strip("-")[:MAX_NAME_BYTES] or "study"
+    own = os.path.basename(os.path.realpath(folder))
+    name = re.sub(r"(?a)[\W_]+", "-", own).strip("-")[:MAX_NAME_BYTES] or "study"
     sources = {
         "Snakefile": "study.smk",
         "config/config.yaml": "study.yaml",

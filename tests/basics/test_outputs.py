@@ -130,12 +130,16 @@ def test_what_is_there_is_replaced_only_if_asked(tmp_path):
     kept = {"notes.txt": b"mine", "figures/mine.png": b"mine"}
     assert content(tmp_path) == {"positions.csv": b"new", "campaign.yaml": b"new", **kept}
     assert "not empty" in refused(tmp_path, CAMPAIGN)  # its header may have been edited by hand
+    with pytest.raises(InputError, match="not empty"), CAMPAIGN.place(tmp_path / "late"):
+        write(tmp_path, late__campaign_yaml="of a second run")
 
 
 def test_what_is_in_the_way(tmp_path):
     write(tmp_path, file="x", out__figures="x")
     assert "is not a folder" in refused(tmp_path / "file", CALIBRATION)
-    assert "file is not a folder" in refused(tmp_path / "file/a/b", CALIBRATION)
+    (tmp_path / "loop").symlink_to("loop")
+    for out, what in (("file/a/b", "file"), ("loop", "loop"), ("loop/a", "loop")):
+        assert f"{what} is not a folder" in refused(tmp_path / out, CALIBRATION)
     assert "figures: is in the way" in refused(tmp_path / "out", CALIBRATION, force=True)
     (tmp_path / "linked").mkdir()
     (tmp_path / "linked/report.html").symlink_to(tmp_path / "file")

@@ -12,7 +12,6 @@ from calling import refusal
 from click.testing import CliRunner
 
 from accelstudy.basics.errors import InputError
-from accelstudy.commands.ending import INTERRUPTED
 from accelstudy.commands.main import Commands
 
 PLAN = ["plan", "--tilt-accuracy", "10mgon", "--sigma", "2mm/s2"]
@@ -36,7 +35,7 @@ def test_an_interrupt_of_an_import_is_one_line(module):
         "sys.meta_path.insert(0, Ctrl())"
     )
     ended = started(code, *PLAN)
-    assert ended.returncode == INTERRUPTED
+    assert ended.returncode == 130
     assert ended.stderr.splitlines()[-1] == "interrupted"
     assert "Traceback" not in ended.stderr
 
@@ -79,21 +78,22 @@ def not_in_the_background():
     signal.signal(signal.SIGINT, before)
 
 
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
 @pytest.mark.parametrize("error", [InputError, ValueError, ImportError])
 @pytest.mark.usefixtures("not_in_the_background")
-def test_an_interrupt_is_no_error_of_a_file(error):
+def test_an_interrupt_is_no_error_of_a_file(error, number):
     """Whatever a library makes of it, as pandas of one that comes while it reads."""
 
     def read():
         try:
-            signal.raise_signal(signal.SIGINT)
+            signal.raise_signal(number)
         except KeyboardInterrupt:
             raise error("log.csv: some line has too many columns") from None
 
-    before = signal.getsignal(signal.SIGINT)
+    before = signal.getsignal(number)
     result = one(read)
-    assert (result.exit_code, result.stderr) == (INTERRUPTED, "interrupted\n")
-    assert signal.getsignal(signal.SIGINT) is before
+    assert (result.exit_code, result.stderr) == (128 + number, "interrupted\n")
+    assert signal.getsignal(number) is before
 
 
 def test_an_error_of_the_system_is_one_line():
@@ -118,8 +118,8 @@ def test_a_reader_that_needs_no_more_is_no_error():
     assert ended.stderr == ""
 
 
-def test_figures_need_no_backend():
+def test_a_command_needs_no_backend_of_figures_and_no_sign_of_the_terminal():
     code = "import atexit, os\natexit.register(lambda: __import__('matplotlib.figure'))"
-    environment = {**os.environ, "MPLBACKEND": "nonsense"}
-    ended = started(code, "catalogue", "models", env=environment, stdout=subprocess.DEVNULL)
+    environment = {**os.environ, "MPLBACKEND": "nonsense", "PYTHONIOENCODING": "cp1250"}
+    ended = started(code, "catalogue", "effects", env=environment, stdout=subprocess.DEVNULL)
     assert (ended.returncode, ended.stderr) == (0, "")
