@@ -83,6 +83,15 @@ def test_a_wrong_noise_does_not_show_in_simulation_and_is_said():
     assert "nothing tells" in sentences(fit_campaign(few, NINE, GRAVITY), "finds")[0]
 
 
+def test_a_refuted_noise_is_that_of_forces_and_of_angles():
+    """As if only the forces were noisier, ratios were 1.06 to 1.23."""
+    drawn = acs.simulate_campaign(seed=3, scheme="fibonacci-14").with_sigma(5e-4)
+    one = acs.calibrate(drawn)
+    assert one.state == "rejected"
+    ratio = check_sigmas(one.fit, replicates=1000, seed=6)["ratio"]
+    assert np.abs(ratio - 1).max() < 4.5 / math.sqrt(2 * 1000)
+
+
 def test_residuals_tell_nothing_of_the_sigma_of_gravity():
     """The noise is stated thrice too large, or is an estimate; gravity is as uncertain as ever."""
     drawn = simulated_campaign({}, noise=Noise(0.002), sigma=0.006)

@@ -3,12 +3,15 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from functools import partial
 
 import numpy as np
 import pandas as pd
 from scipy import special
 
 from accelstudy.adjustment import calibrate
+from accelstudy.adjustment.observations import AngleErrors
+from accelstudy.basics.arrays import Array
 from accelstudy.basics.errors import InputError
 from accelstudy.basics.progress import track
 from accelstudy.basics.units import display_unit, to_display
@@ -24,8 +27,9 @@ def check_sigmas(fit: CampaignFit, replicates: int = 2000, seed: int = 1) -> pd.
     """Simulate sessions with the positions, noise and parameters of a campaign, and calibrate them.
 
     The simulation has the noise that the sigmas are quoted from: the stated one if it is trusted,
-    else that of the residuals. So it finds sigmas that are wrong because the model is not linear
-    within its errors, and none that are wrong because this noise is; see `wording.sentences`.
+    else that of the residuals, which scales forces and angles alike. So it finds sigmas that are
+    wrong because the model is not linear within its errors, and none that are wrong because this
+    noise is; see `wording.sentences`.
 
     Parameters
     ----------
@@ -52,8 +56,17 @@ def check_sigmas(fit: CampaignFit, replicates: int = 2000, seed: int = 1) -> pd.
             f"{fit.campaign.name}: no noise is stated, and no redundancy tells it: there is no "
             "sigma to check"
         )
-    if fit.noise.variance != 1:
-        noise = replace(noise, sigma_force=fit.sigma_position)
+    scale = float(np.sqrt(fit.noise.variance))
+    noise = replace(noise, sigma_force=fit.sigma_position, sigma_angle=scale * noise.sigma_angle)
+    by_reference = fit.solution.observed.angle_errors
+
+    def scaled(errors: AngleErrors, angles: Array) -> tuple[Array, Array]:
+        """Errors of a reference whose readings are as much noisier."""
+        sigma, common = errors(angles)
+        return scale * sigma, common
+
+    angle_errors = None if by_reference is None else partial(scaled, by_reference)
+
     directions = -fit.corrected
     directions /= np.linalg.norm(directions, axis=1, keepdims=True)
     ideal = session(model, fit.parameters, directions, fit.gravity, fit.campaign.hold)
@@ -68,7 +81,7 @@ def check_sigmas(fit: CampaignFit, replicates: int = 2000, seed: int = 1) -> pd.
     )
     rng = np.random.default_rng(np.random.SeedSequence(seed, spawn_key=(0, 1)))
     for _, observed in drawn:
-        observed = with_angle_errors(ideal, observed, fit.solution.observed.angle_errors, rng)
+        observed = with_angle_errors(ideal, observed, angle_errors, rng)
         result = calibrate(model, approach, replace(observed, initial=fit.parameters))
         estimates.append(result.parameters[result.converged, : model.n_parameters])
     errors = np.concatenate(estimates) - fit.parameters
