@@ -136,7 +136,7 @@ def _estimate(solution: Solution, groups: Array, factors: Array) -> VarianceComp
         )
         share = np.einsum("nc,incd,nd->i", pw, m, pw)
         trace = np.einsum("incc->i", mk) - np.einsum("iuu->i", gt)
-        size = np.sqrt(np.diag(s))
+        size = np.sqrt(np.maximum(np.diag(s), 0.0))  # rounding may make a factor near 0 negative
         if not np.all(size > 0) or np.linalg.cond(s / np.outer(size, size)) > 1e10:
             return None
         variances = np.diag(2 * np.linalg.inv(s))

@@ -139,6 +139,23 @@ class Squares(NamedTuple):
         return self.omega / self.redundancy if self.has_variance else otherwise
 
 
+class ForceNoise(NamedTuple):
+    """What the residuals of a session with angles tell of the noise of its forces alone.
+
+    Attributes
+    ----------
+    variance : float, over the one that the forces have in the adjustment; NaN if nothing tells it
+    dof : float, degrees of freedom of that variance
+    in_residuals : float, share of the forces in the redundancy
+    in_parameters : float, largest share of the forces in the variance of a parameter
+    """
+
+    variance: float
+    dof: float
+    in_residuals: float
+    in_parameters: float
+
+
 @dataclass(frozen=True)
 class Solution(Linearisation):
     """One calibrated session, linearised at its solution.
@@ -243,11 +260,40 @@ class Solution(Linearisation):
         Beside angles they are those of σ² of the forces over the square of the share that the
         forces have in r.
         """
-        dof, angles = self.observed.sigma_dof, self.variances.shape[1] > 3
-        r = self.of_positions.redundancy
-        if not (angles and np.isfinite(dof) and r > MIN_REDUNDANCY):
-            return dof
-        return float(dof / (self.shares[:, :3].sum() / r) ** 2)
+        dof, forces = self.observed.sigma_dof, self.force_noise
+        return dof if forces is None else dof / forces.in_residuals**2
+
+    @cached_property
+    def force_noise(self) -> ForceNoise | None:
+        """The noise of the forces where angles are beside them; None if nothing tells it.
+
+        With the part F of the forces in the variance of e the squares of v_f, over their variances,
+        are eᵀ F e. They have the mean tr RF, which a variance θ of the forces makes larger by
+        (θ − 1) tr (RF)², and tr (RF)² are its degrees of freedom (Koch 1999, chapter 3).
+        """
+        (n, c), r = self.misclosures.shape, self.of_positions.redundancy
+        if self.variances.shape[1] == 3 or not self.of_positions.has_variance:
+            return None
+        b, variances = self.jac_observations[..., :3], self.variances[:, :3]
+        part = np.linalg.solve(self.whitening, b) * np.sqrt(variances)[:, None]
+        part = part @ np.swapaxes(part, 1, 2)
+        basis = self.basis[: n * c].reshape(n, c, -1)
+        seen = part @ basis
+        both = np.einsum("ncu,ncv->uv", basis, seen)
+        dof = np.sum(part**2) - 2 * np.sum(seen**2) + np.sum(both**2)
+
+        e = self.errors
+        e = (e - self.basis @ (self.basis.T @ e))[: n * c].reshape(n, c)
+        squares, freedom = np.einsum("nc,ncd,nd->", e, part, e), self.shares[:, :3].sum()
+        # Half of sigma at most, as the step is right for small ones, and none with which the
+        # residuals would tell less than one degree of freedom; these go with the square of θ.
+        least = max(0.25, float(np.sqrt(min(1.0, r / 2) / dof)))
+        variance = max(1 + (squares - freedom) / dof, least)
+
+        u = self.model.n_parameters
+        rows = self.design[: n * c].reshape(n, c, -1) @ self.cofactors[:, :u]
+        in_parameters = np.einsum("ncu,ncd,ndu->u", rows, part, rows) / np.diag(self.cofactors)[:u]
+        return ForceNoise(float(variance), float(dof), freedom / r, float(in_parameters.max()))
 
     @cached_property
     def shares(self) -> Array:

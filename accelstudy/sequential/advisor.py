@@ -143,7 +143,8 @@ def advise(
     rms = chooser.rms(known)
     refuted = stated and not trusted
     if fit is not None and (refuted or np.isfinite(rms).all()):
-        variance = float(upper_bound(*fit.solution.of_positions))
+        dof, variance = fit.dof, fit.noise.variance
+        variance = float(bound(variance * dof, dof)) if np.isfinite(dof) else 1.0
         judged = fit.noise if refuted else fit.noise._replace(variance=variance)
         rms = replace(fit, judgement=judged).tilt_budget(promise.tilt_range).total
     enough = bool(promise.is_kept(rms)) and not wrong

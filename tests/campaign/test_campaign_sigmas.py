@@ -83,6 +83,19 @@ def test_a_wrong_noise_does_not_show_in_simulation_and_is_said():
     assert "nothing tells" in sentences(fit_campaign(few, NINE, GRAVITY), "finds")[0]
 
 
+def test_a_robot_hardly_shows_the_noise_of_a_better_sensor():
+    """By all residuals together intervals held 0.75; with a sigma of ν = 6 Student's t had 380."""
+    inside = []
+    for seed in range(40):
+        one = acs.simulate_campaign(seed=seed, scheme="fibonacci-9", robot_sigma="60mgon")
+        ends = acs.calibrate(one.with_sigma(None)).intervals()
+        true = [p["value"] for effect in one.truth["sensor"] for p in effect["parameters"]]
+        inside.append(np.mean((ends["low"] < true) & (true < ends["high"])))
+    assert np.mean(inside) > 0.92
+    stated = {"sigma_mps2": SIGMA, "degrees_of_freedom": 6.0}
+    assert 6 < acs.calibrate(one.with_header(sensor_noise=stated)).fit.dof < 9
+
+
 def test_a_refuted_noise_is_that_of_forces_and_of_angles():
     """As if only the forces were noisier, ratios were 1.06 to 1.23."""
     drawn = acs.simulate_campaign(seed=3, scheme="fibonacci-14").with_sigma(5e-4)

@@ -98,15 +98,27 @@ class CampaignFit:
     @cached_property
     def noise(self) -> quality.NoiseJudgement:
         """The noise that is quoted: that of another fit, or as the global test judges it."""
-        stated = self.campaign.sigma_force is not None
-        return self.judgement or self.solution.judge_noise(stated)
+        if self.judgement is None and self._by_residuals is not None:
+            return quality.NoiseJudgement(False, 1.0)
+        return self.judgement or self.solution.judge_noise(self.campaign.sigma_force is not None)
+
+    @property
+    def _by_residuals(self) -> quality.ForceNoise | None:
+        """The noise of forces that nobody stated, and that weighs them against angles."""
+        return self.solution.force_noise if self.campaign.sigma_force is None else None
 
     @property
     def dof(self) -> float:
-        """Degrees of freedom of the noise that is quoted; infinite where it is known."""
-        squares = self.solution.of_positions
+        """Degrees of freedom of the noise that is quoted; infinite where it is known.
+
+        Beside angles they are those of a parameter in which the forces have the largest share.
+        """
+        squares, forces = self.solution.of_positions, self.solution.force_noise
         if self.noise.trusted:
-            return self.solution.sigma_dof + squares.redundancy
+            share = 1.0 if forces is None else forces.in_residuals / forces.in_parameters
+            return (self.solution.sigma_dof + squares.redundancy) * share**2
+        if (forces := self._by_residuals) is not None:
+            return forces.dof / forces.in_parameters**2
         return squares.redundancy if squares.has_variance else self.solution.redundancy
 
     @property
@@ -122,7 +134,10 @@ class CampaignFit:
     @property
     def sigma_position_posteriori(self) -> float:
         """Noise of a position mean from the residuals, m/s²; NaN without redundancy."""
-        return self.solution.sigma_posteriori
+        forces = self._by_residuals
+        if forces is None:
+            return self.solution.sigma_posteriori
+        return self.solution.sigma_force * float(np.sqrt(forces.variance))
 
     @property
     def covariance(self) -> Array:

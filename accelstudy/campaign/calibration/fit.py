@@ -36,6 +36,9 @@ not converge."""
 
 UNIT_SIGMA = 1e-3
 """m/s², in place of an unknown sigma; only sigmas a posteriori have a meaning then."""
+MAX_FITS = 30
+SIGMA_TOLERANCE = 1e-4
+"""Change of a sigma, in parts of it, with which its search by repeated fits ends."""
 MIN_SCATTER = 1e-18
 """m/s²; smaller residuals are no rounding, but all zero."""
 CHEAP_SIGMA = 1e-2
@@ -146,14 +149,16 @@ def fit_campaign(
     fit = CampaignFit(campaign, solve(model, approach, observed, adjustment))
     # Angles, and what is known a priori, need a sigma of the forces beside theirs.
     unstated = campaign.sigma_force is None and fit.solution.redundancy > 0
-    for _ in range(3 if unstated else 0):
-        if np.isnan(fit.sigma_position_posteriori):
+    for _ in range(MAX_FITS if unstated else 0):
+        before, sigma = fit.solution.sigma_force, fit.sigma_position_posteriori
+        sigma = max(sigma, 1e-9, least_sigma(campaign, approach))
+        if np.isnan(sigma) or abs(sigma - before) <= SIGMA_TOLERANCE * before:
             break
-        sigma = max(fit.sigma_position_posteriori, 1e-9, least_sigma(campaign, approach))
         observed = replace(observed, sigma_force=sigma)
         adjustment = calibrate(model, approach, observed)
-        if adjustment.converged[0]:
-            fit = replace(fit, solution=solve(model, approach, observed, adjustment))
+        if not adjustment.converged[0]:
+            break
+        fit = replace(fit, solution=solve(model, approach, observed, adjustment))
     if unstated and np.isnan(fit.sigma_position_posteriori):
         raise InputError(
             f"{campaign.name}: nothing tells the noise of the {campaign.n_positions} positions, by "
