@@ -12,6 +12,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from functools import cache
 from itertools import combinations, permutations, product
 from typing import Any, NamedTuple, TypeAlias
 
@@ -103,6 +104,7 @@ def statement_of(
     effects = [one for one in explanations if not one.is_noise]
     if not effects:
         return Statement((), tuple(explanations))
+    cosine = cache(cosine)
     top = max(effects, key=lambda one: one.posterior)
     matches = [_match(top, one, cosine) for one in explanations]
     parts = dict[int, Part]()
