@@ -21,11 +21,10 @@ saving._element = stand_ins.element  # unless a test asks for `composed` or `dra
 
 
 LONGEST = (
-    "test_golden.py", "test_workflow.py", "test_every_path.py", "test_explorer.py",
-    "test_diagnosis.py", "test_gross_errors.py", "test_history.py", "test_plan.py",
-    "test_hidden_physics.py", "test_type_file.py", "test_lots.py", "test_results.py",
-    "test_figures.py", "test_diagnosis_input.py", "test_installed.py", "test_kernel.py",
-    "test_level.py", "test_diagnosis_output.py",
+    "test_golden.py", "test_workflow.py", "test_every_path.py", "test_explorer.py", "test_lots.py",
+    "test_diagnosis.py", "test_gross_errors.py", "test_history.py", "test_plan.py", "test_level.py",
+    "test_hidden_physics.py", "test_type_file.py", "test_results.py", "test_figures.py",
+    "test_diagnosis_input.py", "test_installed.py", "test_kernel.py", "test_diagnosis_output.py",
 )  # fmt: skip
 """The longest first."""
 
