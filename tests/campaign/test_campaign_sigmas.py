@@ -111,7 +111,8 @@ def test_residuals_tell_nothing_of_the_sigma_of_gravity():
     of_gravity = {"value_mps2": drawn.gravity, "sigma_mps2": 0.02}
     refuted = drawn.with_header(gravity=of_gravity)
     pooled = refuted.with_header(sensor_noise={"sigma_mps2": 0.003, "degrees_of_freedom": 9.0})
-    for campaign, state in ((refuted, "rejected"), (pooled, "accepted")):
+    sure = refuted.with_header(sensor_noise={"sigma_mps2": 0.002, "degrees_of_freedom": 1e12})
+    for campaign, state in ((refuted, "rejected"), (pooled, "accepted"), (sure, "accepted")):
         one = acs.calibrate(campaign, approach="gravity")
         assert one.state == state
         assert "The sigmas contain that of gravity, 20.0 mm/s²." in one.verdict

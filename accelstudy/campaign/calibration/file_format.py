@@ -13,7 +13,13 @@ from accelstudy.basics.bounds import Range
 from accelstudy.campaign.columns import ANY
 from accelstudy.campaign.header import Exclusion, LogLayout, Nominal, PerAxis
 from accelstudy.files.documents import Document, Part
-from accelstudy.files.validation import Gravity, ParameterSigma, ParameterValue, bounds_of
+from accelstudy.files.validation import (
+    Gravity,
+    NotNegative,
+    ParameterSigma,
+    ParameterValue,
+    bounds_of,
+)
 from accelstudy.sensors.models import compose
 
 REDUNDANCY, VARIANCE = Range(0, 10**9), Range(-1e18, 1e18)
@@ -330,7 +336,7 @@ class CalibrationDocument(Document):
     gravity_mps2: Gravity
     n_positions: Annotated[int, *bounds_of(bounds.POSITIONS)] | None = None
     sigma_source: Literal["a priori", "a posteriori"] = "a posteriori"
-    sigma_dof: Annotated[float, *bounds_of(REDUNDANCY)] | None = None
+    sigma_dof: NotNegative | None = None
     sigmas_95: ParameterSigma | None = None
     sigma_position_mps2: ParameterSigma | None
     sigma_position_priori_mps2: float | None = None
