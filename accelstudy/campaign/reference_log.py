@@ -167,11 +167,12 @@ class ReferenceLog:
         with _remedy("a name as time_ms tells the unit of its times"):
             limit = MAX_WANDER * windows_at_rest(log).threshold
         time, forces = log.time + apart, log.forces @ self.calibration.mending.T
+        half = holds.log.step / 2  # so that a rounded time changes nothing
         records: dict[int, Array] = {}
         lost: dict[int, str] = {}
         moving = 0
         for n, t0, t1 in table[["t0", "t1"]].itertuples():
-            record = forces[slice(*np.searchsorted(time, [t0, t1 + holds.log.step / 2]))]
+            record = forces[slice(*np.searchsorted(time, [t0 - half, t1 + half]))]
             if len(record) * log.step < MIN_COVERAGE * (t1 - t0) or len(record) < MIN_SAMPLES:
                 lost[n] = "the reference log does not cover it"
             elif reaches_range(record, full_range):

@@ -107,7 +107,7 @@ def test_other_columns_and_times(plate):
         ("other.csv", {"reference_columns": "fx=p,fy=q,fz=r,time=t"}),
         ("shifted.csv", {"reference_offset": -18}),
     ):
-        np.testing.assert_allclose(imported(plate, log, **how).angles, first.angles, atol=2e-4)
+        np.testing.assert_allclose(imported(plate, log, **how).angles, first.angles, atol=1e-9)
 
 
 def test_holds_without_the_reference_are_left_out(plate):
