@@ -165,12 +165,13 @@ def test_a_lag_follows_the_thermometer():
     effects, values = "thermal_bias(tau=400)", {"b_T_x": 2e-3, "b_T_y": -3e-3}
     time = np.linspace(0, 2000, 40)
     rows = rows_of(effects, values, time=time, temperature=25 + 10 * np.sin(time / 500))
-    table, warnings = leveled_rows(calibrated(effects, values), rows, sigma=0.0)
+    table, (said,) = leveled_rows(calibrated(effects, values), rows, sigma=0.0)
     # The lag leaves little of the temperature in 10 minutes; uncorrected it makes about 100 mgon.
     assert_leveled(table, rms=20)
-    said = " ".join(warnings)
     assert "assumes that the sensor has the temperature of row 1" in said
     assert "start of the calibration session" not in said
+    with refused("not after the row above"):
+        leveled_rows(calibrated(effects, values), rows[::-1])
 
 
 def test_the_noise_of_a_thermometer_lags_as_well():

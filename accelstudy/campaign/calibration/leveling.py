@@ -151,7 +151,10 @@ class Leveling:
                     f"{where}, which no log has; a calibration without this effect can be applied"
                 )
             raise InputError(f"{where}; give it by {OPTIONS[condition]}")
-        self.log.check_units([condition for _, condition in self.calibration.model.needs])
+        conditions = [condition for _, condition in self.calibration.model.needs]
+        if "time" in conditions:
+            self.log.check_order(self.log.samples["time"].dropna(), coarse=True)
+        self.log.check_units(conditions)
         usable = self.forces[np.isfinite(self.forces).all(axis=1)]
         if len(usable):
             check_size(f"{path}", usable, self.calibration.gravity, self.log.layout.conversion)

@@ -217,15 +217,9 @@ class Log:
         InputError
             If time does not increase, they are few, or many rows lack a reading.
         """
-        lost, place = self.lost, self.places.get("time")
+        lost = self.lost
         samples = self.samples[~lost] if lost.any() else self.samples
-        if place is not None and (backward := np.diff(samples["time"]) <= 0).any():
-            row = int(samples.index[1 + int(np.argmax(backward))])
-            raise InputError(
-                f"{self.path}: {self.describe(row, 'time')}, not after the row above; sort the "
-                "rows by time, take those of one sensor, or, if its clock is coarse or began anew, "
-                "give `rate`"
-            )
+        self.check_order(samples["time"])
         if lost.sum() > MAX_BAD_SHARE * len(lost):
             row = int(np.argmax(lost))
             hint = "; give the rate (`rate`) instead" if self.unreadable(row)[0] == "time" else ""
@@ -236,6 +230,17 @@ class Log:
         if len(samples) < 2:
             raise InputError(f"{self.path}: too few samples ({len(samples)})")
         return samples
+
+    def check_order(self, time: pd.Series[float], *, coarse: bool = False) -> None:
+        """Raise `InputError` if times of rows go back or, unless the clock may be coarse, stay."""
+        backward = np.diff(time) < 0 if coarse else np.diff(time) <= 0
+        if self.places.get("time") is not None and backward.any():
+            row = int(time.index[1 + int(np.argmax(backward))])
+            raise InputError(
+                f"{self.path}: {self.describe(row, 'time')}, not after the row above; sort the "
+                "rows by time, take those of one sensor, or, if its clock is coarse or began anew, "
+                "give `rate`"
+            )
 
     @cached_property
     def step(self) -> float:
