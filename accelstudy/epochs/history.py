@@ -19,6 +19,7 @@ from numpy.typing import NDArray
 from accelstudy.basics.arrays import Array
 from accelstudy.basics.dates import read_date
 from accelstudy.basics.errors import InputError, key, locate_errors
+from accelstudy.basics.levels import REFUTATION_LEVEL
 from accelstudy.basics.units import GON, MGON, shown_unit, to_display
 from accelstudy.basics.wording import comma_list, estimate, plural
 from accelstudy.campaign.calibration.sensor_calibration import SensorCalibration
@@ -102,9 +103,11 @@ class History(Result):
         places = [[one.model.parameter_names.index(x) for x in names] for one in self.sessions]
         each = [*zip(self.sessions, places, strict=True)]
         self.estimates = np.array([one.parameters[at] for one, at in each])
-        self.covariances = np.array([one.covariance[np.ix_(at, at)] for one, at in each])
+        noise = [_noise(one, n) for one in self.sessions]
+        each_covariance = zip((covariance for covariance, _ in noise), places, strict=True)
+        self.covariances = np.array([full[np.ix_(at, at)] for full, at in each_covariance])
         self.sigmas = np.sqrt(np.diagonal(self.covariances, axis1=1, axis2=2))
-        self.dof = np.array([one.dof for one in self.sessions])
+        self.dof = np.array([dof for _, dof in noise])
         self.interval = None if accuracy is None else Interval(self, accuracy, confidence)
 
     @property
@@ -329,6 +332,22 @@ class History(Result):
             style = "-" if {"drifts", "steps"} & {*found} else ":"
             values = to_display(model.design @ model.estimates, unit)
             ax.plot(times, values, style, color=group_colour(group_of(parameter.name)))
+
+
+def _noise(calibration: SensorCalibration, n: int) -> tuple[Array, float]:
+    """Covariance matrix of a calibration, and its degrees of freedom, among n calibrations.
+
+    Of many calibrations some have residuals that are smaller by chance than the stated noise, and
+    would seem to differ from all others. So a stated noise is taken for too large only at one level
+    for all of them.
+    """
+    document = calibration.document
+    test, variance = document.quality.global_test, document.variance_of_unit_weight
+    quoted = calibration.covariance, calibration.dof
+    if test is None or not variance or test.accepted or test.statistic > test.dof:
+        return quoted
+    refuted = test.p_value < REFUTATION_LEVEL / n
+    return quoted if refuted else (quoted[0] / variance, test.sigma_dof or np.inf)
 
 
 def _check_alike(calibrations: Sequence[SensorCalibration]) -> None:

@@ -83,9 +83,9 @@ class SensorCalibration:
     @property
     def dof(self) -> float:
         """Degrees of freedom of the noise in its sigmas; infinite where it is known."""
-        if self.document.sigma_source == "a posteriori":
-            return self.document.redundancy
-        return self.document.sigma_dof or np.inf
+        of_residuals = self.document.sigma_source == "a posteriori"
+        without = self.document.redundancy if of_residuals else np.inf  # as 0.2 wrote it
+        return self.document.sigma_dof or without
 
     @property
     def usual_layout(self) -> LogLayout:
