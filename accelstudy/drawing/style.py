@@ -73,10 +73,10 @@ TITLES = {"bias-scale": "6: bias, scale", NINE: "9: + non-orthogonality"}
 
 def in_style() -> AbstractContextManager[None]:
     """Draw in the look of all figures, as `figures.mplstyle` has it, within a ``with`` block."""
-    import matplotlib as mpl
+    from matplotlib import style
 
-    sheet = Path(__file__).with_name("figures.mplstyle")
-    return mpl.rc_context(mpl.rc_params_from_file(sheet, use_default_template=False))
+    # A matplotlibrc of the user would make other figures, or none, where it asks for LaTeX.
+    return style.context(["default", Path(__file__).with_name("figures.mplstyle")])
 
 
 def approach_colour(approach: str) -> str:

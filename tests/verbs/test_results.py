@@ -124,12 +124,12 @@ def test_a_result_says_shows_and_draws_itself_and_is_equal_to_itself_alone(every
     given = Figure().subplots()
     assert one.plot(given) is given
     assert given.has_data()
-    with matplotlib.rc_context({"interactive": True, "backend": "agg"}):
+    with matplotlib.rc_context({"interactive": True, "backend": "agg", "text.usetex": True}):
         ax = one.plot()
         assert matplotlib.is_interactive()
-    sizes = {label.get_fontsize() for label in ax.get_xticklabels()}
+    looks = {(label.get_fontsize(), label.get_usetex()) for label in ax.get_xticklabels()}
     with in_style():
-        assert sizes == {matplotlib.rcParams["xtick.labelsize"]}
+        assert looks == {(matplotlib.rcParams["xtick.labelsize"], False)}
     assert not ax.spines["top"].get_visible()
     pyplot.close(ax.figure)
 
