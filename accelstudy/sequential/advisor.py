@@ -144,9 +144,11 @@ def advise(
     refuted = stated and not trusted
     if fit is not None and (refuted or np.isfinite(rms).all()):
         dof, variance = fit.dof, fit.noise.variance
-        variance = float(bound(variance * dof, dof)) if np.isfinite(dof) else 1.0
-        judged = fit.noise if refuted else fit.noise._replace(variance=variance)
-        rms = replace(fit, judgement=judged).tilt_budget(promise.tilt_range).total
+        upper = float(bound(variance * dof, dof)) if np.isfinite(dof) else 1.0
+        judged = fit.noise if refuted else fit.noise._replace(variance=upper)
+        rms = np.full(2, np.inf)
+        if np.isfinite(judged.variance):
+            rms = replace(fit, judgement=judged).tilt_budget(promise.tilt_range).total
     enough = bool(promise.is_kept(rms)) and not wrong
 
     last = -campaign.forces[-1] / np.linalg.norm(campaign.forces[-1]) if n else None

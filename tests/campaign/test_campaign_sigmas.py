@@ -95,6 +95,7 @@ def test_a_robot_hardly_shows_the_noise_of_a_better_sensor():
     assert np.mean(inside) > 0.95
     halves = [p["ci95"] for p in calibration.content["parameters"]]
     assert np.allclose(ends["high"] - ends["low"], 2 * np.array(halves))
+    assert not acs.advise(one.with_sigma(None), tilt_accuracy="1deg").enough
     stated = {"sigma_mps2": SIGMA, "degrees_of_freedom": 6.0}
     assert 6 < acs.calibrate(one.with_header(sensor_noise=stated)).fit.dof < 9
 
