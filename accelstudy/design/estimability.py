@@ -12,6 +12,7 @@ from accelstudy.basics.arrays import Array
 from accelstudy.basics.units import STANDARD_GRAVITY
 from accelstudy.design.information import Information, position_rows, prior_rows, rank_of
 from accelstudy.effects import HoldConditions
+from accelstudy.leveling.angles import angles_of
 from accelstudy.positions.points import evenly_spread
 from accelstudy.positions.scheme import Scheme
 from accelstudy.sensors.sensor import SensorModel
@@ -99,9 +100,11 @@ def estimability(
     names = (*model.parameter_names, "g") if noise.sigma_gravity > 0 else model.parameter_names
     directions = scheme.directions if forces is None else -forces / gravity
     before = prior_rows(model, noise, known)
+    # The noise of a reading turns no robot, whose roll changes at once beside the pole.
+    angles = angles_of(-gravity * directions)
 
     def design(directions: Array) -> Array:
-        rows = position_rows(model, approach, noise, directions, gravity, hold)
+        rows = position_rows(model, approach, noise, directions, gravity, hold, angles=angles)
         return np.concatenate([rows.reshape(-1, len(names)), before])
 
     a = design(directions)

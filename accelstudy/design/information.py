@@ -230,6 +230,7 @@ def position_rows(
     gravity: float = STANDARD_GRAVITY,
     hold: HoldConditions | None = None,
     errors: AngleErrors | None = None,
+    angles: Array | None = None,
 ) -> Array:
     """Rows of the design matrix that each position contributes, at unit weight.
 
@@ -250,6 +251,8 @@ def position_rows(
         What else is known of the k positions.
     errors : function of angles (k, 2), optional
         `sigma_angle` and `common` of `Observations`; errors that all angles share are parameters.
+    angles : (k, 2) array, rad, optional
+        Roll and pitch of the robot, where the directions are not exactly those.
 
     Returns
     -------
@@ -263,12 +266,12 @@ def position_rows(
     force = -gravity * np.asarray(directions, dtype=float)
     observed, variance = force, np.full(force.shape, noise.sigma_force**2)
     common: Array | None = None
+    angles = angles_of(force) if angles is None else angles
     if model.hold_columns:
-        roll, pitch = angles_of(force).T
+        roll, pitch = angles.T
         hold = replace(hold or HoldConditions(), roll=roll, pitch=pitch)
         hold = hold.with_steps(force) if hold.step_x is None else hold
     if approach.uses_angles:
-        angles = angles_of(force)
         sigma, common = (noise.sigma_angle, None) if errors is None else errors(angles)
         observed = np.concatenate([force, angles], axis=1)
         of_angles = np.broadcast_to(np.square(sigma), angles.shape)
