@@ -98,12 +98,12 @@ class CampaignFit:
     @cached_property
     def noise(self) -> quality.NoiseJudgement:
         """The noise that is quoted: that of another fit, or as the global test judges it."""
-        if self.judgement is None and self._by_residuals is not None:
+        if self.judgement is None and self._unstated_noise is not None:
             return quality.NoiseJudgement(False, 1.0)
         return self.judgement or self.solution.judge_noise(self.campaign.sigma_force is not None)
 
     @property
-    def _by_residuals(self) -> quality.ForceNoise | None:
+    def _unstated_noise(self) -> quality.ForceNoise | None:
         """The noise of forces that nobody stated, and that weighs them against angles."""
         return self.solution.force_noise if self.campaign.sigma_force is None else None
 
@@ -117,7 +117,7 @@ class CampaignFit:
         if self.noise.trusted:
             share = 1.0 if forces is None else forces.in_residuals / forces.in_parameters
             return (self.solution.sigma_dof + squares.redundancy) * share**2
-        if (forces := self._by_residuals) is not None:
+        if (forces := self._unstated_noise) is not None:
             return forces.dof / forces.in_parameters**2
         return squares.redundancy if squares.has_variance else self.solution.redundancy
 
@@ -134,7 +134,7 @@ class CampaignFit:
     @property
     def sigma_position_posteriori(self) -> float:
         """Noise of a position mean from the residuals, m/s²; NaN without redundancy."""
-        forces = self._by_residuals
+        forces = self._unstated_noise
         if forces is None:
             return self.solution.sigma_posteriori
         return self.solution.sigma_force * float(np.sqrt(forces.variance))

@@ -36,9 +36,8 @@ not converge."""
 
 UNIT_SIGMA = 1e-3
 """m/s², in place of an unknown sigma; only sigmas a posteriori have a meaning then."""
-MAX_FITS = 30
-SIGMA_TOLERANCE = 1e-4
-"""Change of a sigma, in parts of it, with which its search by repeated fits ends."""
+MAX_FITS, SIGMA_TOLERANCE = 30, 1e-4
+"""Fits at most, and the relative change of a sigma, with which its search by repeated fits ends."""
 MIN_SCATTER = 1e-18
 """m/s²; smaller residuals are no rounding, but all zero."""
 CHEAP_SIGMA = 1e-2
