@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 import re
 from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
 from io import IOBase
 from math import isfinite
 from numbers import Integral, Real
@@ -44,8 +45,8 @@ def whole_number(name: str, value: Any, allowed: Range) -> int:
 def quantity(name: str, value: Any, kind: InputQuantity) -> float:
     """Quantity in SI: a number in SI, or text with a unit, as on the command line."""
     if not isinstance(value, bool) and isinstance(value, Real) and isfinite(value):
-        # The unit may begin with a digit, as 1/K does.
-        value = f"{float(value)!r} {kind.unit}".removesuffix(" 1")
+        # The unit may begin with a digit, as 1/K does; a share has none.
+        kind, value = replace(kind, bare=True), f"{float(value)!r} {kind.unit}".removesuffix(" 1")
     check_type(name, value, str, expected=f"a number in {kind.unit} or a text with its unit")
     with locate_errors(name):
         return kind.read(value)

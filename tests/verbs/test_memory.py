@@ -78,7 +78,7 @@ def test_a_study_in_memory_has_the_numbers_of_one_of_the_workflow(tmp_path):
     scheme.write_text(yaml.safe_dump({"scheme": "mine", "directions": directions}))
     result = acs.simulate(
         ["bias", "bias-scale"], given, ["gravity", "robot"], sigma=["3 mm/s^2", 0.001],
-        robot_sigma="3.2 mgon", truth={"b_x": 0.05, "s_y": "200 ppm"}, replicates=40,
+        robot_sigma="3.2 mgon", truth={"b_x": "50 mm/s^2", "s_y": 200 * 1e-6}, replicates=40,
     )  # fmt: skip
     written = run_study(
         tmp_path,
