@@ -400,6 +400,9 @@ class SensitivityConfig(ConfigSection):
                 f"sensitivity.model: {self.model.name!r} lacks {', '.join(sorted(missing))}, "
                 "which the paper's claims need; choose another model, or paper: false"
             )
+        zeros = [name for name, x in study.truth(sorted(CLAIMED_EFFECTS)).items() if x == 0]
+        if study.paper and zeros:
+            raise InputError(f"sensor: {', '.join(zeros)}: must not be 0, which paper: true needs")
         for name in ("roll_gon", "pitch_gon"):
             if study.paper and 0 not in getattr(self, name):
                 raise InputError(f"sensitivity.{name}: must contain 0, which paper: true needs")
