@@ -3,7 +3,7 @@
 from dataclasses import replace
 
 import numpy as np
-from quality_helpers import SIGMA, draw, ideal_session, one
+from quality_helpers import SIGMA, draw, ideal_session
 from usual import BOTH, GRAVITY, NINE, ROBOT
 
 from accelstudy.adjustment import calibrate
@@ -88,7 +88,8 @@ def test_a_component_that_is_not_there_goes_to_zero_and_not_below():
     """A perfect robot, believed to have 20 mgon."""
     drawn = draw(23, noise=Noise(sigma_angle=0.0), replicates=30)
     assumed = replace(drawn, sigma_angle=COARSE.sigma_angle)
-    found = [variance_components(NINE, ROBOT, one(assumed, i)) for i in range(30)]
+    each = [assumed.sessions(slice(i, i + 1)) for i in range(30)]
+    found = [variance_components(NINE, ROBOT, one) for one in each]
     assert all(f.converged for f in found)
     robot = np.array([f.factors[1] for f in found])
     assert robot.min() >= 0

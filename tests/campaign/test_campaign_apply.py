@@ -35,12 +35,6 @@ def plain():
     return acs.calibrate(simulated_campaign(TRUTH), approach="robot").sensor
 
 
-@pytest.fixture
-def log(tmp_path):
-    """Path of a log to be written."""
-    return tmp_path / "log.csv"
-
-
 def level_log(calibration, log, out, *given, **options):
     """Level a log, and write it."""
     leveled = level(calibration, log, *given, **options)
@@ -299,8 +293,9 @@ def mixed_log():
     )
 
 
-def test_a_log_is_written_with_all_its_cells(plain, log, tmp_path):
+def test_a_log_is_written_with_all_its_cells(plain, tmp_path):
     """What the log had is written as it was; a column of the same name is replaced."""
+    log = tmp_path / "log.csv"
     mixed_log().assign(roll_gon=0.0).to_csv(log, index=False)
     leveled = level_log(plain, log, tmp_path / "out/level.csv")
     assert (len(leveled.added), leveled.lost.sum()) == (N, 0)
@@ -337,7 +332,8 @@ def test_parquet_keeps_its_types(plain, tmp_path):
     assert text[2].startswith("2,2.5,9.5,,1970-01-01 00:00:00.000000001,")
 
 
-def test_a_lost_sample_does_not_lose_the_log(plain, log, tmp_path):
+def test_a_lost_sample_does_not_lose_the_log(plain, tmp_path):
+    log = tmp_path / "log.csv"
     rows = [
         "1,2,9,a", "# a comment", "1,2,,b", "1,2,nan,c", "1,2", "1,2,9,d,1,2,9", "1,-,9,e",
         "1,2,9,f",
@@ -358,8 +354,9 @@ def test_a_lost_sample_does_not_lose_the_log(plain, log, tmp_path):
 
 
 @pytest.mark.parametrize("wanted", ["out.csv.gz", "out.pq"])
-def test_a_log_without_names_is_written_with_places(plain, log, tmp_path, wanted):
+def test_a_log_without_names_is_written_with_places(plain, tmp_path, wanted):
     """The layout of the campaign's log is that of this one, unless another is given."""
+    log = tmp_path / "log.csv"
     forces = mixed_log()[AXES].to_numpy(float)
     np.savetxt(log, np.column_stack([forces, np.full(N, 5)]), "%.4f", delimiter=";")
     given = {"columns": {"fx": 0, "fy": "1", "fz": 2}}

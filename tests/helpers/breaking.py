@@ -104,7 +104,7 @@ def run(tests: list[str], package: Path) -> tuple[int, str]:
     """Exit status of pytest with a package, and the first test that fails."""
     # The folder that pyproject.toml puts first would have the package unbroken.
     options = ["-q", "-x", "-rfE", "--no-header", "--tb=no", "-p", "no:cacheprovider"]
-    options += ["--override-ini", "pythonpath=tests/helpers docs/hooks"]
+    options += ["--override-ini", "pythonpath=tests/helpers docs/hooks benchmarks"]
     lines = (done := python("-m", "pytest", *options, *tests, package=package)).stdout.splitlines()
     failed = [line.split()[1] for line in lines if line.startswith(("FAILED", "ERROR"))]
     return done.returncode, " ".join(failed)

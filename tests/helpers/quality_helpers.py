@@ -31,21 +31,11 @@ def draw(seed, scheme="mclaren-24", model=NINE, noise=None, replicates=1):
     return ideal.draw(noise or Noise(), replicates, np.random.default_rng(seed))
 
 
-def one(observed, i):
-    """Session i of several."""
-    gravity = np.asarray(observed.gravity)
-    return replace(
-        observed,
-        forces=observed.forces[i : i + 1],
-        angles=observed.angles[i : i + 1],
-        gravity=gravity[i : i + 1] if gravity.ndim else gravity,
-    )
-
-
 def solutions(approach, observed):
     """All sessions, calibrated together and linearised one by one."""
     together = calibrate(NINE, approach, observed)
     arrays = [a.name for a in fields(together) if a.name != "redundancy"]
     for i in range(len(observed.forces)):
-        part = replace(together, **{name: getattr(together, name)[i : i + 1] for name in arrays})
-        yield solve(NINE, approach, one(observed, i), part)
+        one = slice(i, i + 1)
+        part = replace(together, **{name: getattr(together, name)[one] for name in arrays})
+        yield solve(NINE, approach, observed.sessions(one), part)

@@ -1,18 +1,15 @@
 """The study of hidden effects: its configuration, its campaigns and seeds, and its jobs."""
 
-from collections import Counter
-
 import pytest
-from places import ROOT
 
 from accelstudy.basics.errors import InputError
 from accelstudy.effects import effect_names, effects_without
-from accelstudy.files.reading import overlay, read_layer
+from accelstudy.files.reading import overlay
 from studies.hidden import campaigns, study
 from studies.hidden.baselines import METHODS
 from studies.hidden.campaigns import parse_hidden, read_rows, row_of, run
 from studies.hidden.physics.generate import Case
-from studies.hidden.study import KINDS, removed
+from studies.hidden.study import removed
 
 TINY = {
     "study": "tiny",
@@ -38,22 +35,6 @@ def test_a_kind_that_no_session_can_show():
         InputError, match=r"one\.kinds: no session of the study can show thermal_bias"
     ):
         config.campaigns()
-
-
-def test_the_full_study():
-    """What the study promises: enough campaigns of each kind, in enough designs."""
-    content = read_layer(ROOT / "studies/hidden/config/hidden-effects.yaml")
-    config = parse_hidden(
-        {**content, "outside": None, "unforeseen": None, "two": None}
-    )  # to plan them takes long
-    cases = [case for case, _ in config.campaigns()]
-    null = [case for case in cases if case.set == "null"]
-    assert len(null) >= 12000
-    assert len({*null}) == len(config.places)
-    counts = Counter((case.what, case.size) for case in cases if case.set == "one")
-    assert set(counts.values()) == {30}
-    # gravity_error is invisible everywhere.
-    assert {what for what, _ in counts} >= {*KINDS["one"][0]} - {"gravity_error"}
 
 
 # --- campaigns and seeds --------------------------------------------------------------------------

@@ -89,20 +89,12 @@ def test_p_is_that_of_a_nested_fit(log):
 
 @pytest.fixture(scope="module")
 def campaigns(log):
-    return rows(OURS)
-
-
-@pytest.fixture(scope="module")
-def table(campaigns):
-    return judge(campaigns)
-
-
-def rows(config):
     """Truths and answers of the campaigns of the log."""
-    return [row_of(config, case, k) for case, k in config.job(*config.jobs)]
+    return [row_of(OURS, case, k) for case, k in OURS.job(*OURS.jobs)]
 
 
-def test_plain_effects_in_white_noise_are_found(table):
+def test_plain_effects_in_white_noise_are_found(campaigns):
+    table = judge(campaigns)
     said = dict(zip(table["cell"], table["said"], strict=True))
     assert said[f"{NAME}/nothing/nan/as it is"] == "nothing"
     assert said[f"{NAME}/quadratic_scale/300/as it is"] in ("right name", "family or set")

@@ -1,7 +1,6 @@
 """Examples print what the tutorials show; what pages for beginners say of accuracies is so."""
 
 import re
-from functools import cache
 
 import numpy as np
 import pytest
@@ -10,7 +9,6 @@ from example_helpers import EXAMPLES, run_example
 from golden import numbers
 from pictures import BATCH, MADE_BY, REPORTS, overview, seen, stale
 from places import ROOT
-from stand_ins import drawn
 from usual import NINE
 
 from accelstudy.approaches import get_approach
@@ -24,22 +22,11 @@ from accelstudy.simulation.sessions import Noise
 NAMES = sorted(path.parent.name for path in EXAMPLES.glob("*/commands.sh"))
 
 
-@pytest.fixture(scope="module")
-def run(tmp_path_factory):
-    """Folder of an example, which runs once, when it is asked for."""
-
-    @cache
-    def ran(name):
-        folder = tmp_path_factory.mktemp(name)
-        with drawn():
-            run_example(name, folder)
-        return folder
-
-    return ran
-
-
-def test_pictures_of_reports_show_what_the_reports_say(run, tmp_path):
-    folders = {name: run(name) for name in ("log", "hidden")}
+@pytest.mark.usefixtures("drawn")
+def test_pictures_of_reports_show_what_the_reports_say(tmp_path):
+    folders = {name: tmp_path / name for name in ("log", "hidden")}
+    for name, folder in folders.items():
+        run_example(name, folder)
     pages = {name: folders[of] / page for name, (of, page, _) in REPORTS.items()}
     pages[BATCH[0]] = overview(*folders.values(), tmp_path / "batch")
     old = stale({name: seen(page) for name, page in pages.items()})

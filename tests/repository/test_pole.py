@@ -32,23 +32,12 @@ def pole():
     return module
 
 
-def calibrated(model=NINE, parameters=None, covariance=None):
-    """A calibration in McLaren's positions, predicted by linear theory unless it is given."""
-    if covariance is None:
-        noise = Noise(sigma_force=SHEET.sigma_mean(10.0))
-        found = estimability(get_scheme("mclaren-24"), model, get_approach("gravity"), noise)
-        covariance = found.cofactors
-    parameters = np.zeros(model.n_parameters) if parameters is None else parameters
+def calibrated(**parameters):
+    """A calibration in McLaren's positions, predicted by linear theory."""
+    noise = Noise(sigma_force=SHEET.sigma_mean(10.0))
+    found = estimability(get_scheme("mclaren-24"), NINE, get_approach("gravity"), noise)
     document = CalibrationDocument.model_construct(gravity_mps2=STANDARD_GRAVITY)
-    return SensorCalibration(document, model, parameters, covariance)
-
-
-def of(pole, name, tilt, calibration=None, setup=None, sheet=SHEET):
-    """What one source contributes by direction, m: horizontal and down."""
-    setup = pole.Pole() if setup is None else setup
-    situation = pole.situation_at(setup, calibration or calibrated(), sheet, tilt)
-    squares = pole.mean_squares(situation)[name]
-    return np.sqrt(squares[:, :2].sum(axis=1)), np.sqrt(squares[:, 2])
+    return SensorCalibration(document, NINE, NINE.vector(parameters), found.cofactors)
 
 
 def test_the_foot_is_where_rotations_put_it(pole):
@@ -81,18 +70,17 @@ def bent_pole(setup, tilt):
 @pytest.mark.parametrize("heights", [(2.0, 1.2), (1.0, 1.2), (1.5, 0.5), (0.3, 2.0)])
 def test_bending_is_that_of_a_beam(pole, heights):
     setup, tilt = pole.Pole(sensor_height=heights[0], hand_height=heights[1]), 40 * GON
-    horizontal, down = of(pole, "bending", tilt, setup=setup)
+    squares = pole.mean_squares(pole.situation_at(setup, calibrated(), SHEET, tilt))["bending"]
     along, below = bent_pole(setup, tilt)
-    np.testing.assert_allclose(horizontal, abs(along), rtol=1e-4)
-    np.testing.assert_allclose(down, abs(below), rtol=1e-4)
+    np.testing.assert_allclose(np.sqrt(squares[:, :2].sum(axis=1)), abs(along), rtol=1e-4)
+    np.testing.assert_allclose(np.sqrt(squares[:, 2]), abs(below), rtol=1e-4)
 
 
 @pytest.mark.parametrize("tilt", np.array([10.0, 30.0, 50.0]) * GON)
 def test_the_budget_agrees_with_the_exact_geometry(pole, tilt):
     """No derivative anywhere; with parameters that are far from zero."""
-    parameters = NINE.vector({"b_x": 0.2, "b_z": -0.3, "s_y": 0.01, "alpha_zx": 500 * MGON})
     setup = replace(pole.Pole(), top_sigma=2e-3, sensor_height=1.5)
-    calibration = calibrated(parameters=parameters)
+    calibration = calibrated(b_x=0.2, b_z=-0.3, s_y=0.01, alpha_zx=500 * MGON)
     table = pole.budget(setup, calibration, SHEET, [tilt]).set_index("source")
     errors = pole.simulate(setup, calibration, SHEET, tilt, 1000, 5)
     for column, squares in (

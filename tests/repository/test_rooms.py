@@ -39,14 +39,29 @@ def test_the_table_for_contributors_has_all_rooms_in_the_order_of_imports(graph)
     assert upwards == set()
 
 
-def test_studies_import_the_package_and_nothing_of_it_imports_them():
-    both = grimp.build_graph(PACKAGE, "studies", cache_dir=None)
+@pytest.fixture(scope="module")
+def both():
+    """What each module of the package and of the studies imports."""
+    return grimp.build_graph(PACKAGE, "studies", cache_dir=None)
+
+
+def test_studies_import_the_package_and_nothing_of_it_imports_them(both):
     used = {
         (importer.split(".")[0], imported.split(".")[0])
         for importer in both.modules
         for imported in both.find_modules_directly_imported_by(importer)
     }
     assert used == {(PACKAGE, PACKAGE), ("studies", "studies"), ("studies", PACKAGE)}
+
+
+def test_the_generator_of_hidden_campaigns_knows_nothing_of_what_it_judges(both):
+    allowed = (
+        "accelstudy.campaign.session", "accelstudy.campaign.format", "accelstudy.basics.errors",
+        "accelstudy.basics.units", "studies.hidden.physics",
+    )  # fmt: skip
+    own = [module for module in both.modules if module.startswith("studies.hidden.physics")]
+    used = {each for module in own for each in both.find_modules_directly_imported_by(module)}
+    assert {each for each in used if not each.startswith(allowed)} == set()
 
 
 def test_a_small_file_with_one_user_belongs_to_its_user(graph):

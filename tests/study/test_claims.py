@@ -8,10 +8,9 @@ import re
 import numpy as np
 import pytest
 from page_helpers import text_of
-from study_helpers import NINE, PROVENANCE, grid, make_study, run_study
+from study_helpers import NINE, grid, make_study, run_study
 from usual import STANDARD_ERRORS
 
-from accelstudy.files.tables import write_table
 from accelstudy.study.claims import quantities
 from accelstudy.study.claims.page import claims_markdown, claims_page
 from accelstudy.study.claims.quantities import single_reductions
@@ -40,18 +39,11 @@ KEYS = {
 
 
 @pytest.fixture(scope="module")
-def folder(tmp_path_factory):
-    return tmp_path_factory.mktemp("claims")
-
-
-@pytest.fixture(scope="module")
-def tables(folder):
-    found = run_study(folder, **KEYS)
+def tables(tmp_path_factory):
+    found = run_study(tmp_path_factory.mktemp("claims"), **KEYS)
     sensitivity = sensitivity_table(make_study(**KEYS), found["summary"])
-    write_table(folder / "sensitivity.parquet", sensitivity, PROVENANCE)
     keys = {**KEYS, "sensitivity": {**KEYS["sensitivity"], "pitch_gon": [0, 25]}}
     shapley = shapley_table(make_study(**keys), found["summary"], found["correlations"])
-    write_table(folder / "shapley.parquet", shapley, PROVENANCE)
     return {**found, "sensitivity": sensitivity, "shapley": shapley}
 
 

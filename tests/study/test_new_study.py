@@ -3,7 +3,7 @@
 import importlib.util
 
 import pytest
-from calling import call, refusal
+from calling import refusal, succeed
 from places import ROOT
 from snakemake_helpers import snakemake
 
@@ -11,16 +11,10 @@ from accelstudy.study.config import read_study
 from accelstudy.study.figures import figure_names
 
 
-def init(*arguments):
-    return call("init", *arguments)
-
-
 @pytest.fixture(scope="module")
 def folder(tmp_path_factory):
     folder = tmp_path_factory.mktemp("init") / "2026.11.29"
-    result = init(folder)
-    assert result.exit_code == 0, result.output
-    assert str(folder / "results" / "2026-11-29") in result.output
+    assert str(folder / "results" / "2026-11-29") in succeed("init", folder).output
     return folder
 
 
@@ -36,28 +30,26 @@ def test_nothing_is_overwritten(folder):
     config.write_text(before.replace("seed: 1", "seed: 2"), encoding="utf-8")
     assert refusal("init", folder).startswith(f"error: {folder}: is not empty")
     assert "seed: 2" in config.read_text(encoding="utf-8")
-    assert init(folder, "--force").exit_code == 0
+    succeed("init", folder, "--force")
     assert config.read_text(encoding="utf-8") == before
 
 
 def test_without_snakemake_one_line_says_what_to_install(tmp_path, monkeypatch):
     monkeypatch.setattr(importlib.util, "find_spec", lambda name: None)
-    result = init(tmp_path / "new")
-    assert result.exit_code == 0
-    (line,) = (line for line in result.output.splitlines() if "missing" in line)
+    output = succeed("init", tmp_path / "new").output
+    (line,) = (line for line in output.splitlines() if "missing" in line)
     assert "pip install 'accelstudy[workflow]'" in line
 
 
 # --- what it is -----------------------------------------------------------------------------------
 
 
-def test_a_new_study_is_planned_by_its_workflow_with_all_profiles(tmp_path):
-    init(tmp_path / "mine")
+def test_a_new_study_is_planned_by_its_workflow_with_all_profiles(folder):
     profiles = {p.relative_to(ROOT) for p in (ROOT / "profiles").rglob("*.yaml")}
     for profile in profiles:
         text = (ROOT / profile).read_text(encoding="utf-8")
-        assert (tmp_path / "mine" / profile).read_text(encoding="utf-8") == text
-    planned = snakemake(tmp_path / "mine", "--profile", "profiles/slurm", "--dry-run")
+        assert (folder / profile).read_text(encoding="utf-8") == text
+    planned = snakemake(folder, "--profile", "profiles/slurm", "--dry-run")
     assert planned.returncode == 0, planned.stdout
-    assert "All results of the study mine" in planned.stdout
-    assert "snakemake --cores 2 " in (tmp_path / "mine" / "README.md").read_text("utf-8")
+    assert "All results of the study 2026-11-29" in planned.stdout
+    assert "snakemake --cores 2 " in (folder / "README.md").read_text("utf-8")

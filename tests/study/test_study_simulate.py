@@ -24,19 +24,12 @@ from accelstudy.study.tables import read_estimates
 GRAVITY, ROBOT = f"{NINE}/mclaren-24/gravity", f"{NINE}/mclaren-24/robot"
 
 
-@pytest.fixture(scope="module")
-def written(tmp_path_factory):
-    cells = make_cells(grid(schemes=["faces-6", "mclaren-24"], approaches="gravity"), grid())
-    folder = tmp_path_factory.mktemp("batch")
-    paths = simulate_cells(folder, cells.values())
-    return cells, paths["estimates"], paths["leveling"]
-
-
 # --- content -------------------------------------------------------------------------------------
 
 
-def test_rows_of_the_estimates(written):
-    cells, estimates, _ = written
+def test_rows_of_the_estimates(tmp_path):
+    cells = make_cells(grid(schemes=["faces-6", "mclaren-24"], approaches="gravity"), grid())
+    estimates = simulate_cells(tmp_path, cells.values())["estimates"]
     assert pq.read_schema(estimates).equals(ESTIMATES)
     assert not read_table(estimates).drop(columns="omega").isna().any().any()
     table = read_estimates(estimates, GRAVITY)
@@ -127,10 +120,6 @@ def test_a_repository_around_an_installed_package_is_not_its_own(tmp_path, monke
 # --- whole or not at all -------------------------------------------------------------------------
 
 
-def files(folder):
-    return sorted(path.name for path in folder.rglob("*") if path.is_file())
-
-
 def test_nothing_is_left_of_an_interrupted_job(monkeypatch, tmp_path):
     calls = []
 
@@ -144,7 +133,7 @@ def test_nothing_is_left_of_an_interrupted_job(monkeypatch, tmp_path):
     with pytest.raises(KeyboardInterrupt):
         simulate_cells(tmp_path, make_cells(grid()).values())
     assert calls == [GRAVITY, ROBOT]
-    assert files(tmp_path) == []
+    assert [path for path in tmp_path.rglob("*") if path.is_file()] == []
 
 
 # --- reading -------------------------------------------------------------------------------------

@@ -1,12 +1,14 @@
 """The workflow end to end: the same content however it is run, and bad input ends in one line."""
 
 import os
+import re
 import shutil
 import signal
 import subprocess
 import time
 import zipfile
 from pathlib import Path
+from textwrap import dedent
 
 import pandas as pd
 import pyarrow.parquet as pq
@@ -22,8 +24,7 @@ from accelstudy.files import outputs
 from accelstudy.files.outputs import check_writable
 from accelstudy.files.reading import read_layer
 from accelstudy.files.tables import read_origin, read_table
-from accelstudy.study.config import parse_study
-from accelstudy.study.figures import figure_names, get_figure
+from accelstudy.study.figures import get_figure
 from accelstudy.study.tables import TABLES
 
 TINY = read_layer(ROOT / ".test" / "config" / "config.yaml")
@@ -33,27 +34,20 @@ TABLE_PATHS = [f"results/tiny/{name}.parquet" for name in TABLES]
 
 SET_UPS = [f"{model}/{approach}" for model in MODELS for approach in ("gravity", "robot")]
 """What a job simulates."""
-MODULE = """\
-from accelstudy.files.shipped import shipped
-configfile: "outer.yaml"
-module inner:
-    snakefile: str(shipped("workflow/Snakefile"))
-    config: config["inner"]
-    prefix: "inner"
-use rule * from inner as inner_*
+OUTER = """\
 rule part:
     output: "{part}.txt"
     shell: "echo {wildcards.part} > {output}"
 rule study:
     default_target: True
     input:
-        rules.inner_all.input,
-        table=rules.inner_collect.output.cells,
+        rules.leveling_all.input,
+        table=rules.leveling_collect.output.cells,
         parts=expand("{part}.txt", part=config["parts"]),
     output: report("done.txt", category="Outer")
     shell: "cp {input.parts} {output} && test -s {input.table}"
 """
-"""The workflow as a part of another one, as the guide to configurations has it."""
+"""What uses the workflow as a part of another one, as the guide to configurations has it."""
 
 
 def words(folder, *arguments, snakefile=ROOT / "Snakefile", cores=2, config=TINY):
@@ -173,12 +167,6 @@ def planned(folder, *arguments, **options):
     return jobs(succeed(folder, "--dry-run", *arguments, **options))
 
 
-def test_dry_run(tmp_path):
-    figures = len(figure_names(parse_study(TINY)))
-    assert planned(tmp_path) == {"simulate": 4, "collect": 1, "figure": figures, "page": 1}
-    assert not (tmp_path / "results").exists()
-
-
 def test_another_unit_of_angles_draws_again(single, monkeypatch):
     monkeypatch.setitem(ENVIRONMENT, "ACCELSTUDY_ANGLE_UNIT", "deg")
     assert planned(single).keys() == {"page", "figure"}
@@ -266,12 +254,14 @@ def check_report(folder, results):
 
 def test_a_module_with_a_prefix(single, tmp_path):
     """All is in the folder of the prefix; a job finds its tables and figures there."""
+    guide = (ROOT / "docs/guides/configuration.md").read_text("utf-8")
+    module = re.search(r"    from accelstudy(.*\n)*?(?=`snakefile`)", guide)[0]
     outer = tmp_path / "outer"
-    shutil.copytree(single / "results", outer / "inner" / "results")
-    results = outer / "inner" / "results" / "tiny"
+    shutil.copytree(single / "results", outer / "leveling" / "results")
+    results = outer / "leveling" / "results" / "tiny"
     (results / "explorer.html").unlink()
-    (outer / "Snakefile").write_text(MODULE)
-    (outer / "outer.yaml").write_text(yaml.safe_dump({"parts": ["a"], "inner": TINY}))
+    (outer / "Snakefile").write_text(f"{dedent(module)}{OUTER}")
+    (outer / "my-study.yaml").write_text(yaml.safe_dump({"parts": ["a"], "leveling": TINY}))
     for words in ([], ["--report", "report.zip"]):
         result = snakemake(outer, "--cores", 1, *words)
         assert result.returncode == 0, result.stdout

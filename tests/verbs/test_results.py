@@ -162,12 +162,6 @@ def test_a_function_and_its_command_write_the_same(results, verb, tmp_path):
 # --- a calibration -------------------------------------------------------------------------------
 
 
-def test_the_calibration_of_the_guide_finds_the_bias(guide):
-    found = guide["calibration"].parameters.loc[["b_x", "b_y", "b_z"]]
-    assert (abs(found["value"] - np.array(BIAS)) < 4 * found["sigma"]).all()
-    assert len(guide["leveled"]) == len(logged())
-
-
 def test_the_unit_of_angles_is_that_of_the_environment(guide, monkeypatch):
     monkeypatch.setenv("ACCELSTUDY_ANGLE_UNIT", "deg")
     assert {"roll_deg", "sigma_pitch_mdeg"} <= {*guide["calibration"].apply(logged())}
