@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 from page_helpers import assert_sound
-from session_helpers import SENSOR, write_document
+from session_helpers import SENSOR, calibrated
 from usual import share_tolerance
 
 import accelstudy as acs
@@ -116,21 +116,16 @@ def test_what_is_detectable_is_found_as_often_as_is_said(sigmas, dof):
 YEARS = ("2023-01-01", "2023-07-01", "2024-01-01", "2024-06-30", "2025-01-01")
 
 
-def calibrations(folder, biases):
-    """Five calibrations of a sensor; b_x is given."""
-    for k, b_x in enumerate(biases):
-        effects = (f"bias: {b_x}, 0.05, -0.1", *SENSOR[1:])
-        write_document(folder / f"{k}.json", k + 1, effects=effects)
-        yield folder / f"{k}.json"
-
-
 @pytest.mark.usefixtures("composed")
 @pytest.mark.parametrize("per_year", [0.0, 0.02])
 def test_a_drift_is_found_and_shortens_the_interval(per_year, tmp_path):
     """Calibrations come in any order."""
-    paths = list(calibrations(tmp_path, [0.1 + per_year * k / 2 for k in range(5)]))
+    each = [
+        calibrated(k + 1, effects=(f"bias: {0.1 + per_year * k / 2}, 0.05, -0.1", *SENSOR[1:]))
+        for k in range(5)
+    ]
     dates = np.array(YEARS[::-1], dtype="datetime64[D]").tolist()
-    history = acs.history(paths[::-1], dates=dates, tilt_accuracy="60 mgon")
+    history = acs.history(each[::-1], dates=dates, tilt_accuracy="60 mgon")
     history.save(tmp_path / "out")
     content = history.content
     assert history.state == ("changed" if per_year else "unchanged")

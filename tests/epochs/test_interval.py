@@ -6,11 +6,10 @@ from datetime import datetime, timedelta
 import numpy as np
 import pytest
 from closed_forms import roll_and_pitch
-from session_helpers import document
+from session_helpers import calibrated
 from usual import share_tolerance
 
 from accelstudy.basics.units import GON, MGON
-from accelstudy.campaign.calibration.result import Calibration
 from accelstudy.epochs.course import YEAR
 from accelstudy.epochs.history import History
 from accelstudy.epochs.interval import MAX_YEARS, Interval
@@ -25,7 +24,7 @@ AT = np.array([-2.5, -2.0, -1.4, -0.9, -0.5, 0.0])
 @pytest.fixture(scope="module")
 def session():
     effects = ("bias: 0.1, 0.05, -0.1", "scale: 0.002, -0.001, 0.003")
-    return Calibration(None, document(1, model="bias-scale", effects=effects)).sensor
+    return calibrated(1, model="bias-scale", effects=effects).sensor
 
 
 def tilts(rng, largest, n=300):
