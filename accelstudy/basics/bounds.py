@@ -60,7 +60,7 @@ ANGLE = Range(-400.0, 400.0, "gon")
 # The hottest accelerometers work in oil wells, at up to 200 °C; in kelvin none works at so little.
 TEMPERATURE = Range(-273.15, 210.0, "°C", other="kelvin", shift=273.15)
 VIBRATION = Range(0.0, 1e4, "m/s²")
-TIME = Range(-1e12, 1e12, "s")
+TIME = Range(0.0, 1e12, "s")
 INTERVAL = Range(1e-6, 1e6, "s")
 RATE = Range(1e-6, 1e9, "per second")
 # Parameters of sensors, in SI: no sensor has larger ones, and their squares stay finite.

@@ -71,6 +71,7 @@ def estimability(
     known: Known | None = None,
     forces: Array | None = None,
     blur: float = 0.0,
+    gain: float = 1.0,
 ) -> Estimability:
     """Work out what a scheme determines, before any simulation.
 
@@ -95,6 +96,7 @@ def estimability(
         Noisy readings in place of the directions, corrected up to a linear map: their lengths
         count, as unit vectors would have the sensor's errors in their directions.
     blur : float, m/s², noise of readings by which they are judged
+    gain : float, of the readings over the forces
     """
     noise = noise or Noise()
     names = (*model.parameter_names, "g") if noise.sigma_gravity > 0 else model.parameter_names
@@ -110,7 +112,7 @@ def estimability(
     a = design(directions)
     rank, condition, free = exact = rank_of(a)
     if blur and not free.any():
-        shifts = blur / gravity * np.eye(3)
+        shifts = blur / (gain * gravity) * np.eye(3)
         changes = np.concatenate([design(directions + shift) - a for shift in shifts])
         rank, condition, free = rank_of(a, ABOVE_NOISE * changes)
     not_estimable = tuple(name for name, is_free in zip(names, free, strict=True) if is_free)

@@ -117,7 +117,7 @@ class Design(Result):
     @property
     def content(self) -> dict[str, Any]:
         """State, verdict, how the positions were found, and the positions."""
-        positions = self.to_frame().to_dict("records")
+        positions = self.to_frame().replace({np.nan: None}).to_dict("records")
         found = {"design": self.provenance, "positions": positions}
         return {"state": self.state, "verdict": self.verdict, **found}
 

@@ -130,7 +130,7 @@ def apply(
     variable: kinds.Variable = None,
     unit: kinds.Unit = None,
     frame: kinds.Frame = None,
-    start: Annotated[Quantity | None, si("s", 0.0, TIME.most)] = None,
+    start: Annotated[Quantity | None, si("s", TIME.least, TIME.most)] = None,
     sigma: Annotated[Quantity | None, si("m/s^2", 0.0, SIGMA_READING.most)] = None,
 ) -> pd.DataFrame:
     """Apply a calibration to a log and level with it.

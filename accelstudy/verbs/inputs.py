@@ -11,6 +11,7 @@ from accelstudy.basics.arguments import check_type, path_of
 from accelstudy.campaign.calibration.campaign_fit import CampaignFit
 from accelstudy.campaign.calibration.fit import fit_campaign
 from accelstudy.campaign.format import read_campaign
+from accelstudy.campaign.gross_errors.recognition import check_plausible
 from accelstudy.campaign.sensor_type import with_type
 from accelstudy.campaign.session import Campaign
 from accelstudy.sensors.models import get_model
@@ -24,6 +25,8 @@ def as_campaign(campaign: Any, plausible: bool = True) -> Campaign:
     check_type(
         "campaign", campaign, Campaign, expected="a Campaign, as find_holds returns, or a path"
     )
+    if plausible:
+        check_plausible(campaign, campaign.name)
     return campaign
 
 

@@ -11,7 +11,7 @@ import accelstudy as acs
 from accelstudy.basics.errors import InputError
 from accelstudy.basics.units import GON, STANDARD_GRAVITY
 from accelstudy.campaign.calibration.fit import fit_campaign
-from accelstudy.campaign.format import read_campaign, write_campaign
+from accelstudy.campaign.format import write_campaign
 from accelstudy.campaign.gross_errors.recognition import EXCHANGES, GROSS_ERRORS, recognise
 from accelstudy.campaign.header import LogLayout
 from accelstudy.diagnosis.pipeline import diagnose
@@ -30,14 +30,19 @@ GRAVITY_20 = acs.simulate_campaign(scheme="fibonacci-20", approach="gravity")
 
 
 @pytest.mark.parametrize("wrong", [{"force": 1 / STANDARD_GRAVITY}, {"angle": 0.9},
-                                   {"angle": np.pi / 200}])  # fmt: skip
+                                   {"angle": np.pi / 200}, {"force": 1e-4}])  # fmt: skip
 def test_usual_wrong_units_are_refused(wrong, tmp_path):
-    spoiled = gross.unit(CLEAN, **wrong)
-    with pytest.raises(InputError, match=r"look like|, not in gon"):
+    """In memory, too, where very small forces ended in an error of NumPy's arrays."""
+    spoiled, written = gross.unit(CLEAN, **wrong), tmp_path / "written"
+    write_campaign(spoiled, written, plausible=False)
+    refused = "look like|, not in gon|nowhere near"
+    with pytest.raises(InputError, match=refused):
         write_campaign(spoiled, tmp_path / "refused")
-    write_campaign(spoiled, tmp_path / "written", plausible=False)
-    with pytest.raises(InputError, match=r"look like|, not in gon"):
-        read_campaign(tmp_path / "written")
+    for campaign in (spoiled, written):
+        with pytest.raises(InputError, match=refused):
+            acs.calibrate(campaign)
+        with pytest.raises(InputError, match=refused):
+            acs.advise(campaign, tilt_accuracy=1e-4)
     assert not (tmp_path / "refused").exists()
 
 

@@ -202,7 +202,7 @@ def campaign_estimability(
     campaign: Campaign, model: SensorModel, approach: Approach, blur: float = 0.0
 ) -> Estimability:
     """Say what the positions of a campaign determine, above a noise of its means in m/s²."""
-    start = initial_values(model, campaign.forces, campaign.gravity)
+    start, names = initial_values(model, campaign.forces, campaign.gravity), model.parameter_names
     rough = model.correct(campaign.forces, start, campaign.gravity, campaign.hold)
     return estimability(
         Scheme(campaign.name, campaign.name, -rough, "exact", f"campaign {campaign.name}"),
@@ -214,6 +214,7 @@ def campaign_estimability(
         known={} if campaign.sensor_type is None else campaign.sensor_type.known,
         forces=rough if blur else None,
         blur=blur,
+        gain=1 + float(start[names.index("s_x")]) if "s_x" in names else 1.0,
     )
 
 
