@@ -156,7 +156,7 @@ def double(tmp_path_factory):
 def single(tmp_path_factory):
     """All effects, one that clips, and one that takes counts, in single precision."""
     made = {ALL: calibration_with(ALL)}
-    made[CLIPS] = calibration_with(CLIPS, values=[1.0, 1.0, 1.0])
+    made[CLIPS] = calibration_with(CLIPS, values=[1.0, 1.001, 1.001])
     linear = calibration_with(("bias", "scale", "nonorthogonality", "quadratic_scale"))
     mended = Correction(error="axis_error", reason="x is y", matrix=TURN.tolist())
     for frame in FRAMES:
@@ -205,12 +205,12 @@ def test_c_follows_a_lag_as_its_head_says(double):
 
 @needs_cc
 def test_c_has_no_force_where_apply_has_none(single):
-    """Hard clipping: nothing is known of what lies beyond the knee."""
-    readings = np.array([[0.0, 0.0, -8.0], [0.0, 9.5, 0.0]])
+    """Beyond the knee of hard clipping; a loss of gain of 1.001 has roots at -500 m/s² there."""
+    readings = np.array([[0.0, 0.0, -8.0], [9.5, 0.0, 0.0], [0.0, 9.5, 0.0], [0.0, 9.5, -9.5]])
     force = single(CLIPS, readings, {})
     np.testing.assert_allclose(force[0], [0, 0, -8], atol=1e-5)
-    assert np.isnan(force[1]).all()
-    assert np.isnan(single.calibrations[CLIPS].correct(readings)[1]).any()
+    assert np.isnan(force[1:]).all()
+    assert np.isnan(single.calibrations[CLIPS].correct(readings)[1:]).any(axis=1).all()
 
 
 @needs_cc

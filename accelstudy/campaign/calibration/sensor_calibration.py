@@ -20,7 +20,7 @@ from accelstudy.campaign.columns import COLUMNS
 from accelstudy.campaign.header import LogLayout
 from accelstudy.effects import HoldConditions, TemperatureCourse
 from accelstudy.effects.hold_conditions import REFERENCE_TEMPERATURE
-from accelstudy.leveling.angles import angles_of, tilt_by_output, tilt_slope
+from accelstudy.leveling.angles import angles_of, jacobian, tilt_slope
 from accelstudy.sensors.models import compose
 from accelstudy.sensors.sensor import SensorModel
 
@@ -171,9 +171,7 @@ class SensorCalibration:
         (n, 3) array, m/s²; NaN where no force explains the reading
         """
         sessions, share, hold = self._sessions(forces, hold)
-        return self.model.correct(sessions, share * self.parameters, self.gravity, hold).reshape(
-            -1, 3
-        )
+        return self._solve(sessions, share * self.parameters, hold)[0].reshape(-1, 3)
 
     def level(
         self, forces: ArrayLike, sigma_force: float, hold: HoldConditions | None = None
@@ -198,14 +196,29 @@ class SensorCalibration:
     ) -> tuple[Array, Array, Array]:
         """Return what `correct` and `level` do, of one solution of the equations."""
         sessions, share, hold = self._sessions(forces, hold)
-        model, p, g = self.model, share * self.parameters, self.gravity
-        corrected = model.correct(sessions, p, g, hold)
-        slope = share[:, None, None] * tilt_slope(model, p, sessions, corrected, g, hold)
+        p = share * self.parameters
+        corrected, by_reading = self._solve(sessions, p, hold)
+        at = self.model, p, sessions, corrected, self.gravity, hold
+        slope = share[:, None, None] * tilt_slope(*at)
         variance = np.sum((slope @ self.covariance) * slope, axis=-1)
-        by_output = tilt_by_output(model, p, sessions, corrected, g, hold)
+        by_output = jacobian(corrected) @ by_reading
         variance += np.square(sigma_force) * np.sum(by_output**2, axis=-1)
         corrected, sigma = corrected.reshape(-1, 3), np.sqrt(variance).reshape(-1, 2)
         return corrected, angles_of(corrected), sigma
+
+    def _solve(
+        self, sessions: Array, parameters: Array, hold: HoldConditions | None
+    ) -> tuple[Array, Array]:
+        """Forces of readings (s, k, 3) and their derivatives by the readings (s, k, 3, 3).
+
+        A root where an output falls as its force grows is none: if a loss of gain is estimated as
+        1.001, where a sensor clips, a reading beyond the knee has a root at -1000 g.
+        """
+        at = sessions, parameters, self.gravity, hold
+        by_reading = self.model.output_jacobian(*at)
+        rises = (np.diagonal(by_reading, axis1=-2, axis2=-1) > 0).all(axis=-1, keepdims=True)
+        is_root = rises | self.model.trace.affine
+        return np.where(is_root, self.model.correct(*at), np.nan), by_reading
 
     def _sessions(
         self, forces: ArrayLike, hold: HoldConditions | None
