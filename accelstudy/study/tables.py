@@ -191,11 +191,13 @@ def coverage_columns(inside: Estimates, n: int) -> dict[str, Any]:
     if not n:
         nothing = dict.fromkeys(("coverage_95_low", "coverage_95_high"), np.nan)
         return {**_columns("coverage_95", UNKNOWN), **nothing}
-    plain = np.clip(inside.plain, 0.0, 1.0)  # a mean of ones may round to more than one
-    alone, error = np.sqrt(plain * (1 - plain) / n), np.hypot(inside.error, 1 / n)
+    # A mean of ones may round to more than one.
+    plain, value = (np.clip(share, 0.0, 1.0) for share in (inside.plain, inside.value))
+    # By the better share: of few intervals all may hold the truth, and would seem to be exact.
+    alone, error = np.sqrt(value * (1 - value) / n), np.hypot(inside.error, 1 / n)
     better = (inside.gain != 1) & (error < alone)
     gain = np.where(better, (alone / error) ** 2, 1.0)
-    value = np.where(better, inside.value, plain)
+    value = np.where(better, value, plain)
     low, high = np.array([wilson(round(share * n), n) for share in plain]).T
     return {
         **_columns("coverage_95", Estimates(value, np.where(better, error, alone), gain, plain)),

@@ -105,10 +105,13 @@ def test_wilson_interval_of_the_coverage():
 
 
 def test_a_coverage_that_rounds_to_more_than_one():
-    """A mean of ones is made of differences and of linear theory's, each rounded."""
-    row = coverage(30, value=0.95, error=1e-4, gain=9.0, plain=np.nextafter(1, 2))
-    assert (row["coverage_95"], row["coverage_95_high"]) == (1, 1)
-    assert row["coverage_95_se"] == 0
+    """A mean of ones is made of differences; where linear theory tells the share, it stays that."""
+    every = np.nextafter(1, 2)
+    row = coverage(30, value=every, error=0.0, gain=1.0, plain=every)
+    assert (row["coverage_95"], row["coverage_95_high"], row["coverage_95_se"]) == (1, 1, 0)
+    row = coverage(30, value=0.95, error=1e-4, gain=9.0, plain=every)
+    assert row["coverage_95"] == 0.95
+    assert row["coverage_95_se"] == pytest.approx(1 / 30, rel=1e-3)
 
 
 def test_ratio_of_sigma_a_posteriori_to_the_empirical_one(study, summary):
