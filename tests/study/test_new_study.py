@@ -52,4 +52,5 @@ def test_a_new_study_is_planned_by_its_workflow_with_all_profiles(folder):
     planned = snakemake(folder, "--profile", "profiles/slurm", "--dry-run")
     assert planned.returncode == 0, planned.stdout
     assert "All results of the study 2026-11-29" in planned.stdout
+    assert not (folder / "results").exists()
     assert "snakemake --cores 2 " in (folder / "README.md").read_text("utf-8")

@@ -24,7 +24,8 @@ from accelstudy.files import outputs
 from accelstudy.files.outputs import check_writable
 from accelstudy.files.reading import read_layer
 from accelstudy.files.tables import read_origin, read_table
-from accelstudy.study.figures import get_figure
+from accelstudy.study.config import parse_study
+from accelstudy.study.figures import figure_names, get_figure
 from accelstudy.study.tables import TABLES
 
 TINY = read_layer(ROOT / ".test" / "config" / "config.yaml")
@@ -105,6 +106,8 @@ def test_all_is_made(single):
     hashes = {read_origin(path)["config_hash"] for path in results.rglob("*.parquet")}
     assert len(hashes) == 1
     assert not list(results.glob("claims*"))
+    drawn = {path.stem for path in results.glob("figures/*.svg")}
+    assert drawn == {*figure_names(parse_study(TINY))}
     estimates = results.glob("estimates/**/*.parquet")
     assert {p.relative_to(results / "estimates").with_suffix("").as_posix() for p in estimates} == {
         *SET_UPS
