@@ -11,6 +11,7 @@ import numpy as np
 import pandas as pd
 import pytest
 from calling import call, succeed
+from jsonschema import Draft202012Validator
 from log_helpers import session
 from matplotlib import pyplot
 from matplotlib.figure import Figure
@@ -19,8 +20,15 @@ from scipy import stats
 from usual import compare_few
 
 import accelstudy as acs
+from accelstudy.campaign.calibration.file_format import CalibrationDocument
 from accelstudy.drawing.style import in_style
+from accelstudy.epochs.file_format import HistoryDocument
+from accelstudy.files.documents import json_text
+from accelstudy.lots.file_format import LotDocument
+from accelstudy.planning.plan import PlanDocument
 from accelstudy.schemes import get_scheme
+from accelstudy.sequential.advice import AdviceDocument
+from accelstudy.study.result import SimulationDocument
 
 matplotlib.use("agg")
 BIAS = (0.05, 0.01, 0.03)
@@ -99,6 +107,7 @@ def every(guide, results):
         ),
         "advise": acs.advise(guide["campaign"], tilt_accuracy="1gon", model="bias"),
         "data-sheet": acs.data_sheet(guide["folder"] / "imu.csv", **HOW),
+        "simulate": acs.simulate("bias", ["faces-6", "mclaren-24"], "robot", sigma=1e-3),
     }
 
 
@@ -157,6 +166,33 @@ def test_a_function_and_its_command_write_the_same(results, verb, tmp_path):
     (other / "report.html").write_text("mine")
     with pytest.raises(acs.InputError, match="force"):
         result.save(other)
+
+
+def strict(schema):
+    """Let a schema take all keys that it describes, and no others."""
+    if isinstance(schema, list):
+        return [strict(each) for each in schema]
+    if not isinstance(schema, dict):
+        return schema
+    content = {key: strict(value) for key, value in schema.items()}
+    if "properties" in schema and "type" in schema:
+        content |= {"required": [*schema["properties"]]}
+        content |= {"additionalProperties": False}
+    return content
+
+
+@pytest.mark.parametrize(("name", "document"), [
+    ("calibrate", CalibrationDocument), ("compare", HistoryDocument), ("history", HistoryDocument),
+    ("lot", LotDocument), ("advise", AdviceDocument), ("simulate", SimulationDocument),
+    ("plan", PlanDocument),
+])  # fmt: skip
+def test_each_key_of_a_result_is_described(every, name, document):
+    content = json.loads(json_text(every[name].content))
+    if name == "lot":
+        content["files"] = []  # of a lot that is written
+    schema = Draft202012Validator(strict(document.model_json_schema()))
+    assert [error.message for error in schema.iter_errors(content)] == []
+    assert document.check(content).model_dump(exclude_unset=True, by_alias=True) == content
 
 
 # --- a calibration -------------------------------------------------------------------------------
