@@ -33,7 +33,7 @@ from accelstudy.basics.errors import InputError, brief, locate_errors
 from accelstudy.basics.levels import MAX_TILT_GON
 from accelstudy.basics.names import MAX_NAME_BYTES
 from accelstudy.basics.units import GON, MGON, STANDARD_GRAVITY, to_si
-from accelstudy.effects import Effect, get_effect
+from accelstudy.effects import Effect, get_effect, is_effect
 from accelstudy.files import validation as kinds
 from accelstudy.files.reading import overlay, read_layer
 from accelstudy.files.validation import ConfigSection, Configuration, OneOrMore, validate
@@ -178,8 +178,8 @@ def _name(name: str) -> str:
 
 
 def _own_name(name: str) -> str:
-    if name in MODELS or name == "all":
-        raise InputError("is the name of registered models; choose another")
+    if name in MODELS or is_effect(name) or name == "all":
+        raise InputError("is the name of registered models or of an effect; choose another")
     return _name(name)
 
 
