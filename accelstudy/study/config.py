@@ -62,7 +62,7 @@ def read_study(*paths: str | Path) -> Study:
     content: dict[str, Any] = {}
     for path in paths:
         content = overlay(content, read_layer(path))
-    return parse_study(content, ", ".join(str(path) for path in paths))
+    return parse_study(content, ", ".join(map(str, paths)) or "config")
 
 
 def parse_study(content: Mapping[str, Any], source: str = "config") -> Study:

@@ -245,7 +245,7 @@ def simulate(
     sigma: Sigma | Sequence[Sigma],
     robot_sigma: RobotSigma = "3.2mgon",
     gravity: kinds.Gravity = STANDARD_GRAVITY,
-    truth: Annotated[Mapping[str, float | str] | None, kinds.pairs("b_x=0.05,s_y=200ppm")] = None,
+    truth: Annotated[Mapping[str, float | str] | None, kinds.pairs("b_x=5mg,s_y=200ppm")] = None,
     replicates: Annotated[int, Range(2, bounds.REPLICATES.most)] = 1000,
     seed: kinds.Seed = 1,
 ) -> Simulation:
