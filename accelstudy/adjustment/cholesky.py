@@ -28,6 +28,21 @@ def factor(matrices: Array, tolerance: float = 0.0) -> Array:
     return lower
 
 
+def factor_of_rows(rows: Array) -> tuple[Array, Array]:
+    """L (c, c, ...) and U (c, o, ...) with R = L U for `rows` R (c, o, ...), and U Uᵀ = I.
+
+    L is the factor of R Rᵀ, by the modified Gram–Schmidt process. Products of rows whose sizes are
+    1e-5 of each other would leave half of the digits.
+    """
+    lower, unit = np.zeros((len(rows), len(rows), *rows.shape[2:])), rows.copy()
+    for j in range(len(rows)):
+        lower[j, j] = np.sqrt(np.einsum("o...,o...->...", unit[j], unit[j]))
+        unit[j] /= lower[j, j]
+        lower[j + 1 :, j] = np.einsum("co...,o...->c...", unit[j + 1 :], unit[j])
+        unit[j + 1 :] -= lower[j + 1 :, j, None] * unit[j]
+    return lower, unit
+
+
 def forward(lower: Array, right: Array) -> Array:
     """Solve L y = b for `right` (k, ...) or (k, m, ...), L (k, k, ...)."""
     result = right.copy()

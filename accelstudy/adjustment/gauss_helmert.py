@@ -262,19 +262,18 @@ class WhitenedConditions:
     factor : (c, c, R, n) array, L with B Q Bᵀ = L Lᵀ
     design : (c, u, R, n) array, L⁻¹ A
     misclosures : (c, R, n) array, L⁻¹ (ψ(l + v) − B v)
-    bq : (c, o, R, n) array, B Q
+    corrections : (c, o, R, n) array, −L⁻¹ B Q, residuals by errors of unit weight
     """
 
     factor: Array
     design: Array
     misclosures: Array
-    bq: Array
+    corrections: Array
 
     def solve(self, dx: Array) -> tuple[Array, Array]:
         """Errors of unit weight (c, R, n) and residuals v (o, R, n) after a step (u, R)."""
         errors = self.misclosures + np.einsum("curn,ur->crn", self.design, dx)
-        v = np.einsum("crn,corn->orn", -cholesky.backward(self.factor, errors), self.bq)
-        return errors, v
+        return errors, np.einsum("crn,corn->orn", errors, self.corrections)
 
 
 def whiten(at: Linearisation, v: Array, q: Array) -> WhitenedConditions:
@@ -282,11 +281,12 @@ def whiten(at: Linearisation, v: Array, q: Array) -> WhitenedConditions:
 
     v : (o, R, n); q : (o, n) variances or (o, o, n) matrices
     """
-    b = at.jac_observations
-    bq = _times(b, q)
-    factor, design = _factor_and_design(at, bq)
+    b, root = at.jac_observations, _root(q)
+    factor, unit = cholesky.factor_of_rows(_times(b, root))
+    design = cholesky.forward(factor, at.jac_parameters)
     w = cholesky.forward(factor, at.psi - np.einsum("corn,orn->crn", b, v))
-    return WhitenedConditions(factor, design, w, bq)
+    transposed = root.swapaxes(0, -2)  # standard deviations stay as they are
+    return WhitenedConditions(factor, design, w, -_times(unit, transposed))
 
 
 def whitened_design(at: Linearisation, q: Array) -> Array:
@@ -294,22 +294,18 @@ def whitened_design(at: Linearisation, q: Array) -> Array:
 
     q : (o, n) variances or (o, o, n) matrices
     """
-    return _factor_and_design(at, _times(at.jac_observations, q))[1]
+    factor, _ = cholesky.factor_of_rows(_times(at.jac_observations, _root(q)))
+    return cholesky.forward(factor, at.jac_parameters)
 
 
-def _factor_and_design(at: Linearisation, bq: Array) -> tuple[Array, Array]:
-    """Scale conditions to unit weight: M = B Q Bᵀ = L Lᵀ; L (c, c, R, n), L⁻¹A (c, u, R, n)."""
-    b = at.jac_observations
-    m = np.empty((len(b), len(b), *b.shape[2:]))
-    for i in range(len(b)):  # the factorisation reads the lower triangle only
-        m[i:, i] = np.einsum("corn,orn->crn", bq[i:], b[i])
-    lower = cholesky.factor(m)
-    return lower, cholesky.forward(lower, at.jac_parameters)
+def _root(q: Array) -> Array:
+    """Standard deviations (o, n), or G (o, o, n) with Q = G Gᵀ."""
+    return np.sqrt(q) if q.ndim == 2 else cholesky.factor(q)
 
 
-def _times(b: Array, q: Array) -> Array:
-    """Product B Q, (c, o, R, n)."""
-    return b * q[:, None] if q.ndim == 2 else np.einsum("corn,opn->cprn", b, q)
+def _times(b: Array, root: Array) -> Array:
+    """Product B G, (c, o, R, n)."""
+    return b * root[:, None] if root.ndim == 2 else np.einsum("corn,opn->cprn", b, root)
 
 
 def _normal_equations(a: Array, w: Array) -> tuple[Array, Array]:

@@ -117,9 +117,7 @@ def estimability(
         rank, condition, free = rank_of(a, ABOVE_NOISE * changes)
     not_estimable = tuple(name for name, is_free in zip(names, free, strict=True) if is_free)
     reason, cofactors = "", np.full((len(names), len(names)), np.nan)
-    if not np.isfinite(a).all():
-        reason = "the sigmas differ too much: the conditions have no weights to compute with"
-    elif not_estimable:
+    if not_estimable:
         blind = is_blind(model, approach, noise, gravity)
         reason = (
             f"rank {rank} of {len(names)}: {', '.join(not_estimable)} cannot be told apart by "

@@ -80,8 +80,6 @@ class Search:
         if not len(self.candidates):
             limits = ", ".join(self.allowed.constraints) or "no constraints"
             raise InputError(f"no attitude is left of {self.allowed.text} with {limits}")
-        if not np.isfinite(self._informations).all():
-            raise InputError(self.task.missing(self.candidates))
         each = [self._from_start(n, start) for start in range(1, starts + 1)]
         best = each[first_best([self.value(one) for one in each], DESIGN_TOLERANCE)]
         directions = round_directions(self._join(best))

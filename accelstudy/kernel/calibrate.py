@@ -77,9 +77,8 @@ class Kernel:
         """Numbers of the positions that are the same in all replicates, (n, columns)."""
         conditions, known = problem.conditions, self.function.known
         trace, n = conditions.equations.trace, len(problem.cofactors)
-        variances = problem.cofactors
-        unit = np.sqrt(np.divide(1.0, variances, out=np.zeros_like(variances), where=variances > 0))
-        columns = [variances, unit]
+        sigmas = np.sqrt(problem.cofactors)
+        columns = [sigmas, np.divide(1.0, sigmas, out=np.zeros_like(sigmas), where=sigmas > 0)]
         if known.shape[0]:
             unused, p = np.zeros((3, 1, n)), np.zeros((trace.n_parameters, 1))
             g = np.array([conditions.gravity], dtype=float)

@@ -56,7 +56,7 @@ class KernelFunction:
     The function has these arguments, for n positions, R replicates, u parameters (gravity is the
     last if it is estimated), o observations per position and k known numbers:
 
-        known         (n, 2 o + k)  variances of the observations, their 1/σ (0 where σ = 0),
+        known         (n, 2 o + k)  σ of the observations, their 1/σ (0 where σ = 0),
                                     and the numbers of `known`
         forces        (R, n, 3)
         angles        (R, n, 2)     if the approach uses them
@@ -295,10 +295,12 @@ class _Writer:
         a = [row[1 : 1 + u] for row in rows]
         b = [row[1 + u :] for row in rows]
 
-        q = [self.known(i, k) for k in range(o)]
-        bq = [[value * variance for value, variance in zip(row, q, strict=True)] for row in b]
-        m = [[dot(bq[j], b[k]) for k in range(j + 1)] for j in range(c)]
-        whitening, pivots = factor(m, 0.0)
+        sigmas = [self.known(i, k) for k in range(o)]
+
+        def by_sigma(rows: Rows) -> Rows:
+            return [[x * sigma for x, sigma in zip(row, sigmas, strict=True)] for row in rows]
+
+        whitening, pivots, unit = factor_of_rows(by_sigma(b))
         w = [p - dot(row, v) for p, row in zip(psi, b, strict=True)]
 
         def white(columns: Rows) -> Rows:
@@ -308,7 +310,7 @@ class _Writer:
         psi_white = forward(whitening, pivots, psi)
         w_white = forward(whitening, pivots, w)
         a_white = white(a)
-        bq_white = white(bq)
+        bq_white = by_sigma(unit)
         size: Term = size_psi.get()
         for value in psi_white:
             size = larger(absolute(value), size)
@@ -472,6 +474,20 @@ def factor(matrix: Rows, tolerance: float) -> tuple[Rows, list[Term]]:
                 below = fma(-a, b, below)
             lower[i].append(below * pivots[j])
     return lower, pivots
+
+
+def factor_of_rows(rows: Rows) -> tuple[Rows, list[Term], Rows]:
+    """L and 1/L_kk, as of `factor`, and U with R = L U for rows R, and U Uᵀ = I."""
+    lower: Rows = [[] for _ in rows]
+    pivots: list[Term] = []
+    unit: Rows = []
+    for row, below in zip(rows, lower, strict=True):
+        for other in unit:
+            below.append(dot(row, other))
+            row = [fma(-below[-1], b, a) for a, b in zip(row, other, strict=True)]
+        pivots.append(1.0 / root(above(dot(row, row), 0.0)))
+        unit.append([value * pivots[-1] for value in row])
+    return lower, pivots, unit
 
 
 def forward(lower: Rows, pivots: list[Term], right: list[Term]) -> list[Term]:

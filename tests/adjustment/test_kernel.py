@@ -11,6 +11,7 @@ from accelstudy import adjustment
 from accelstudy.adjustment.calibration import Block, CalibrationProblem
 from accelstudy.adjustment.equations import equations_of
 from accelstudy.basics.errors import InputError
+from accelstudy.basics.units import GON
 from accelstudy.effects import HoldConditions, effect_names
 from accelstudy.schemes import get_scheme
 from accelstudy.sensors.models import get_model
@@ -105,6 +106,10 @@ def test_what_does_not_converge_and_what_is_singular():
     found, expected = both(NINE, ROBOT, drawn(NINE, Noise(), 5, 1).take(np.zeros(24, int)))
     assert not found.converged.any()
     assert_same(found, expected)
+    # A robot that tells next to nothing, beside a good sensor, is no reason not to converge.
+    found, expected = both(NINE, ROBOT, drawn(NINE, Noise(1e-5, 10 * GON), 20, 1))
+    assert found.converged.all()
+    assert expected.converged.all()
 
 
 def test_who_shares_the_lanes_changes_no_bit():
