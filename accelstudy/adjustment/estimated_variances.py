@@ -61,6 +61,11 @@ def _scaled(true: Array, means: Array, products: Array) -> tuple[Array, Array]:
     return scale, mean / scale / 2
 
 
+def _tail(limit: float, scale: Array, half: Array) -> float:
+    """Probability that squares are larger than a limit, by what `_scaled` returns."""
+    return float(np.mean(special.gammaincc(half, limit / scale / 2)))
+
+
 def probability_beyond(limit: float, true: Array, means: Array, products: Array) -> float:
     """Probability that squares are larger than a limit.
 
@@ -71,8 +76,7 @@ def probability_beyond(limit: float, true: Array, means: Array, products: Array)
     means : (k,) array, traces of Aₖ
     products : (k, k) array, traces of Aₖ Aₗ
     """
-    scale, half = _scaled(true, means, products)
-    return float(np.mean(special.gammaincc(half, limit / scale / 2)))
+    return _tail(limit, *_scaled(true, means, products))
 
 
 def dof_of_squares(means: Array, products: Array, dof: Array, level: float) -> float:
@@ -89,12 +93,11 @@ def dof_of_squares(means: Array, products: Array, dof: Array, level: float) -> f
     f, true = float(np.sum(means)), true_variances(dof)
     scale, half = _scaled(true, means, products)
     quantiles = 2 * scale * special.gammainccinv(half, level)
-
-    def too_often(limit: float) -> float:
-        """Probability beyond a limit, less the level."""
-        return float(np.mean(special.gammaincc(half, limit / scale / 2))) - level
-
-    ends = float(quantiles.min()), float(quantiles.max())
-    limit = optimize.brentq(too_often, *ends, rtol=LIMIT_TOLERANCE) / f
-    nu = float(special.fdtridfd(f, 1 - level, limit))
+    limit = optimize.brentq(
+        lambda limit: _tail(limit, scale, half) - level,
+        float(quantiles.min()),
+        float(quantiles.max()),
+        rtol=LIMIT_TOLERANCE,
+    )
+    nu = float(special.fdtridfd(f, 1 - level, limit / f))
     return nu if nu < MANY else np.inf

@@ -29,7 +29,8 @@ class RandomEffects:
     ----------
     values, variances : (n,) arrays
     design : (n, u) array, of rank u
-    variance_dof : (n,) array, degrees of freedom of the variances; infinite where they are known
+    variance_dof : (n,) array or one number, degrees of freedom of the variances; infinite where
+        they are known
     """
 
     values: Array
@@ -45,9 +46,7 @@ class RandomEffects:
     @cached_property
     def scatter(self) -> float:
         """Standard deviation of the additional scatter."""
-        if not self.dof or self.squares(0.0) <= self.dof:
-            return 0.0
-        return self._root(lambda scatter: self.dof - self.squares(scatter))
+        return self._root(lambda scatter: self.dof - self.squares(scatter)) if self.dof else 0.0
 
     @cached_property
     def estimates(self) -> Array:
@@ -114,15 +113,13 @@ class RandomEffects:
         return self.scatter_below(beyond), self.scatter_below(1 - beyond, least=1.0)
 
     def scatter_below(self, probability: float, least: float = 0.0) -> float:
-        """Bound of the scatter that holds with a probability; `least` as above."""
-
-        def less(scatter: float) -> float:
-            return self.probability_beyond(scatter, least) - probability
-
-        return self._root(less) if less(0.0) < 0 else 0.0
+        """Bound of the scatter that holds with a probability; `least` of `probability_beyond`."""
+        return self._root(lambda x: self.probability_beyond(x, least) - probability)
 
     def _root(self, rising: Callable[[float], float]) -> float:
-        """Scatter at which a function is zero that rises with it, and is negative without any."""
+        """Scatter at which a function is zero that rises with it; 0 if it is never negative."""
+        if rising(0.0) >= 0:
+            return 0.0
         most = float(np.ptp(self.values)) + float(np.sqrt(np.max(self.variances)))
         while rising(most) < 0:
             most *= 4
