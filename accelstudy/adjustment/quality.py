@@ -260,8 +260,10 @@ class Solution(Linearisation):
         Beside angles they are those of σ² of the forces over the square of the share that the
         forces have in r.
         """
-        dof, forces = self.observed.sigma_dof, self.force_noise
-        return dof if forces is None else dof / forces.in_residuals**2
+        dof = self.observed.sigma_dof
+        if np.isinf(dof) or self.force_noise is None:
+            return dof
+        return dof / self.force_noise.in_residuals**2
 
     @cached_property
     def force_noise(self) -> ForceNoise | None:
@@ -285,8 +287,8 @@ class Solution(Linearisation):
         e = self.errors
         e = (e - self.basis @ (self.basis.T @ e))[: n * c].reshape(n, c)
         squares, freedom = np.einsum("nc,ncd,nd->", e, part, e), self.shares[:, :3].sum()
-        # Half of sigma at most, as the step is right for small ones, and none with which the
-        # residuals would tell less than one degree of freedom; these go with the square of θ.
+        # The step is right to first order: it halves sigma at most, and leaves the residuals one
+        # degree of freedom at least, as these go with the square of θ.
         least = max(0.25, float(np.sqrt(min(1.0, r / 2) / dof)))
         variance = max(1 + (squares - freedom) / dof, least)
 

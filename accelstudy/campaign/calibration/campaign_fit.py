@@ -117,7 +117,7 @@ class CampaignFit:
         if self.noise.trusted:
             share = 1.0 if forces is None else forces.in_residuals / forces.in_parameters
             return (self.solution.sigma_dof + squares.redundancy) * share**2
-        if (forces := self._unstated_noise) is not None:
+        if forces is not None and self.campaign.sigma_force is None:
             return forces.dof / forces.in_parameters**2
         return squares.redundancy if squares.has_variance else self.solution.redundancy
 
