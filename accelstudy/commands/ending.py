@@ -34,8 +34,8 @@ def interruptible() -> Iterator[None]:
     """End with one line where Ctrl-C or SIGTERM comes, whatever a library makes of it.
 
     What was begun is removed, and the exit status is that of shells, 128 and the number of the
-    signal. Some libraries report it as an error of their own: pandas as one of the file that it
-    reads, numpy as one of its import.
+    signal. Some libraries report a signal as an error of their own: pandas as one of the file that
+    it reads, numpy as one of its import.
     """
     came = None
 
@@ -45,10 +45,8 @@ def interruptible() -> Iterator[None]:
         raise KeyboardInterrupt
 
     numbers = (signal.SIGINT, signal.SIGTERM) if current_thread() is main_thread() else ()
-    handlers = {number: signal.getsignal(number) for number in numbers}
-    before = {number: own for number, own in handlers.items() if own is not signal.SIG_IGN}
-    for number in before:
-        signal.signal(number, stop)
+    heeded = [number for number in numbers if signal.getsignal(number) is not signal.SIG_IGN]
+    handlers = [signal.signal(number, stop) for number in heeded]
     try:
         yield
     except (Exception, KeyboardInterrupt) as error:
@@ -57,7 +55,7 @@ def interruptible() -> Iterator[None]:
         click.echo("interrupted", err=True)
         raise SystemExit(128 + (came or signal.SIGINT)) from None
     finally:
-        for number, handler in before.items():
+        for number, handler in zip(heeded, handlers, strict=True):
             signal.signal(number, handler)
 
 

@@ -101,11 +101,10 @@ class History(Result):
         self.model, self.tilt_range = self.sessions[0].model, tilt_range
         names = self.model.parameter_names
         places = [[one.model.parameter_names.index(x) for x in names] for one in self.sessions]
-        each = [*zip(self.sessions, places, strict=True)]
-        self.estimates = np.array([one.parameters[at] for one, at in each])
         noise = [_noise(one, n) for one in self.sessions]
-        each_covariance = zip((covariance for covariance, _ in noise), places, strict=True)
-        self.covariances = np.array([full[np.ix_(at, at)] for full, at in each_covariance])
+        each = [*zip(self.sessions, noise, places, strict=True)]
+        self.estimates = np.array([one.parameters[at] for one, _, at in each])
+        self.covariances = np.array([full[np.ix_(at, at)] for _, (full, _), at in each])
         self.sigmas = np.sqrt(np.diagonal(self.covariances, axis1=1, axis2=2))
         self.dof = np.array([dof for _, dof in noise])
         self.interval = None if accuracy is None else Interval(self, accuracy, confidence)

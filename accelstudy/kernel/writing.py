@@ -135,7 +135,7 @@ Rows: TypeAlias = list[list[Term]]
 
 
 def text_of(function: KernelFunction) -> str:
-    """Write the function as LLVM's text, which is results."""
+    """Write the function as LLVM's text, which is cached."""
     return cached_by_key(function.key, "kernel", lambda: _Writer(function).code.text())
 
 
@@ -204,7 +204,7 @@ class _Writer:
             still = going & step.finite(code) & ~converged
             active.set(still.select(1.0, 0.0))
             code.leave_unless(still.any())
-        self.results(first, results, numbers < code.of_integer(code.arguments["replicates"]))
+        self.write_results(first, results, numbers < code.of_integer(code.arguments["replicates"]))
 
     def observe(self, rows: list[Any]) -> Term:
         """Take the observations into `work`; returns the tolerance of the step."""
@@ -367,7 +367,7 @@ class _Writer:
         size_v.set(size)
         self.write(i, o, v_new)
 
-    def results(self, first: Any, results: _Results, valid: Mask) -> None:
+    def write_results(self, first: Any, results: _Results, valid: Mask) -> None:
         """Write the results of a group."""
         code, u = self.code, self.u
         lower: Rows = [[variable.get() for variable in row] for row in results.lower]
