@@ -64,8 +64,11 @@ def test_an_earlier_result_is_replaced_whole(tmp_path):
     assert out.stat().st_ino == number
 
 
-@pytest.mark.parametrize("error", [ValueError("no"), OSError(errno.ENOSPC, "No space left")])
-def test_a_failed_run_leaves_the_earlier_result(tmp_path, error):
+@pytest.mark.parametrize(("error", "line"), [
+    (ValueError("no"), "^no$"),
+    (OSError(errno.ENOSPC, "No space left"), "out: cannot be written: No space left$"),
+])  # fmt: skip
+def test_a_failed_run_leaves_the_earlier_result(tmp_path, error, line):
     out = tmp_path / "out"
     write(out, calibration_json="old", report_html="old")
 
@@ -74,7 +77,7 @@ def test_a_failed_run_leaves_the_earlier_result(tmp_path, error):
             write(folder, calibration_json="new")
             raise error
 
-    with pytest.raises(ValueError, match=f"{error.args[-1]}$"):  # InputError is one
+    with pytest.raises(ValueError, match=line):  # InputError is one
         run()
     assert content(tmp_path) == {"out/calibration.json": b"old", "out/report.html": b"old"}
 
