@@ -101,7 +101,7 @@ class History(Result):
         self.model, self.tilt_range = self.sessions[0].model, tilt_range
         names = self.model.parameter_names
         places = [[one.model.parameter_names.index(x) for x in names] for one in self.sessions]
-        noise = [_noise(one, n) for one in self.sessions]
+        noise = [_judge_noise(one, n) for one in self.sessions]
         each = [*zip(self.sessions, noise, places, strict=True)]
         self.estimates = np.array([one.parameters[at] for one, _, at in each])
         self.covariances = np.array([full[np.ix_(at, at)] for _, (full, _), at in each])
@@ -333,7 +333,7 @@ class History(Result):
             ax.plot(times, values, style, color=group_colour(group_of(parameter.name)))
 
 
-def _noise(calibration: SensorCalibration, n: int) -> tuple[Array, float]:
+def _judge_noise(calibration: SensorCalibration, n: int) -> tuple[Array, float]:
     """Covariance matrix of a calibration, and its degrees of freedom, among n calibrations.
 
     Of many calibrations some have residuals that are smaller by chance than the stated noise, and
