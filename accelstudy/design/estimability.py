@@ -96,7 +96,7 @@ def estimability(
         Noisy readings in place of the directions, corrected up to a linear map: their lengths
         count, as unit vectors would have the sensor's errors in their directions.
     blur : float, m/s², noise of readings by which they are judged
-    gain : float, of the readings over the forces
+    gain : float, of the sensor: the noise of corrected `forces` is the blur over it
     """
     noise = noise or Noise()
     names = (*model.parameter_names, "g") if noise.sigma_gravity > 0 else model.parameter_names
