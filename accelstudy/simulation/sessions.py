@@ -168,7 +168,11 @@ class Session:
 
 
 def with_angle_errors(
-    ideal: Session, drawn: Observations, errors: AngleErrors | None, rng: np.random.Generator
+    ideal: Session,
+    drawn: Observations,
+    errors: AngleErrors | None,
+    rng: np.random.Generator,
+    scale: float,
 ) -> Observations:
     """Sessions whose angles were told by a reference, instead of a robot.
 
@@ -178,10 +182,12 @@ def with_angle_errors(
     drawn : Observations, sessions that were drawn of it
     errors : function of angles, as of `Observations`; None leaves the sessions as they are
     rng : Generator, for the errors that all positions share
+    scale : float, of the sigmas of the other errors
     """
     if errors is None or drawn.angles is None:
         return drawn
     sigma, common = errors(ideal.angles)
+    sigma = scale * sigma
     noise = (drawn.angles - ideal.angles) * sigma / np.asarray(drawn.sigma_angle)
     shared = rng.standard_normal((len(noise), common.shape[-1]))
     angles = ideal.angles + noise + np.einsum("nak,rk->rna", common, shared)

@@ -3,15 +3,12 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from functools import partial
 
 import numpy as np
 import pandas as pd
 from scipy import special
 
 from accelstudy.adjustment import calibrate
-from accelstudy.adjustment.observations import AngleErrors
-from accelstudy.basics.arrays import Array
 from accelstudy.basics.errors import InputError
 from accelstudy.basics.progress import track
 from accelstudy.basics.units import display_unit, to_display
@@ -58,15 +55,7 @@ def check_sigmas(fit: CampaignFit, replicates: int = 2000, seed: int = 1) -> pd.
         )
     scale = float(np.sqrt(fit.noise.variance))
     noise = replace(noise, sigma_force=fit.sigma_position, sigma_angle=scale * noise.sigma_angle)
-    by_reference = fit.solution.observed.angle_errors
-
-    def scaled(errors: AngleErrors, angles: Array) -> tuple[Array, Array]:
-        """Errors of a reference whose readings are as much noisier."""
-        sigma, common = errors(angles)
-        return scale * sigma, common
-
-    angle_errors = None if by_reference is None else partial(scaled, by_reference)
-
+    angle_errors = fit.solution.observed.angle_errors
     directions = -fit.corrected
     directions /= np.linalg.norm(directions, axis=1, keepdims=True)
     ideal = session(model, fit.parameters, directions, fit.gravity, fit.campaign.hold)
@@ -81,7 +70,7 @@ def check_sigmas(fit: CampaignFit, replicates: int = 2000, seed: int = 1) -> pd.
     )
     rng = np.random.default_rng(np.random.SeedSequence(seed, spawn_key=(0, 1)))
     for _, observed in drawn:
-        observed = with_angle_errors(ideal, observed, angle_errors, rng)
+        observed = with_angle_errors(ideal, observed, angle_errors, rng, scale)
         result = calibrate(model, approach, replace(observed, initial=fit.parameters))
         estimates.append(result.parameters[result.converged, : model.n_parameters])
     errors = np.concatenate(estimates) - fit.parameters
