@@ -54,7 +54,7 @@ class Congruence:
         """Whether epochs differ by no more than their covariance matrices say."""
         f, nu = self.freedom
         statistic = self._squares / f
-        p_value = f_tail(statistic, f, nu)
+        p_value = _f_tail(statistic, f, nu)
         return Test(statistic=statistic, dof=[f, nu], p_value=p_value, level=LEVEL)
 
     @cached_property
@@ -127,7 +127,7 @@ class Congruence:
         return first_best(rest, STATISTIC_TOLERANCE * rest[0])
 
 
-def f_tail(statistic: float, p: int, nu: float) -> float:
+def _f_tail(statistic: float, p: int, nu: float) -> float:
     """Probability of a larger F(p, ν), which is χ²/p where ν is infinite."""
     if np.isinf(nu):
         return float(stats.chi2.sf(p * statistic, p))
