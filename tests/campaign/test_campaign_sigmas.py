@@ -93,7 +93,9 @@ def test_a_robot_hardly_shows_the_noise_of_a_better_sensor():
         true = [p["value"] for effect in one.truth["sensor"] for p in effect["parameters"]]
         inside.append(np.mean((ends["low"] < true) & (true < ends["high"])))
     assert np.mean(inside) > 0.95
-    halves = [p["ci95"] for p in calibration.content["parameters"]]
+    parameters = calibration.content["parameters"]
+    assert all(p["sigma"] == pytest.approx(p["sigma_posteriori"]) for p in parameters)
+    halves = [p["ci95"] for p in parameters]
     assert np.allclose(ends["high"] - ends["low"], 2 * np.array(halves))
     assert not acs.advise(one.with_sigma(None), tilt_accuracy="1deg").enough
     stated = {"sigma_mps2": SIGMA, "degrees_of_freedom": 6.0}

@@ -98,9 +98,13 @@ class CampaignFit:
     @cached_property
     def noise(self) -> quality.NoiseJudgement:
         """The noise that is quoted: that of another fit, or as the global test judges it."""
-        if self.judgement is None and self._unstated_noise is not None:
+        return self.judgement or self.judge_noise(self.campaign.sigma_force is not None)
+
+    def judge_noise(self, stated: bool) -> quality.NoiseJudgement:
+        """Judge the noise that is stated, or else that of the residuals."""
+        if self._unstated_noise is not None:
             return quality.NoiseJudgement(False, 1.0)
-        return self.judgement or self.solution.judge_noise(self.campaign.sigma_force is not None)
+        return self.solution.judge_noise(stated)
 
     @property
     def _unstated_noise(self) -> quality.ForceNoise | None:

@@ -35,7 +35,7 @@ def calibration_document(
     campaign, header, solution = fit.campaign, fit.campaign.header, fit.solution
     covariance, sigma = fit.covariance, fit.sigma
     sigma_priori = np.sqrt(np.diag(solution.cofactors))
-    sigma_posteriori = np.sqrt(np.diag(solution.covariance(solution.judge_noise(False))))
+    sigma_posteriori = np.sqrt(np.diag(solution.covariance(fit.judge_noise(False))))
     affine = fit.model.affine(fit.parameters)
     content = {
         "campaign": campaign.name,
