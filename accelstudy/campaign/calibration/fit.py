@@ -38,6 +38,8 @@ UNIT_SIGMA = 1e-3
 """m/s², in place of an unknown sigma; only sigmas a posteriori have a meaning then."""
 MAX_FITS, SIGMA_TOLERANCE = 30, 1e-4
 """Fits at most, and the relative change of a sigma, with which its search by repeated fits ends."""
+MIN_SINGULAR = 0.01
+"""Smallest singular value, over the largest, of what positions tell of an ellipsoid."""
 MIN_SCATTER = 1e-18
 """m/s²; smaller residuals are no rounding, but all zero."""
 CHEAP_SIGMA = 1e-2
@@ -233,15 +235,22 @@ def _cause(campaign: Campaign, model: SensorModel, theory: Estimability) -> str:
 
 
 def initial_values(model: SensorModel, forces: Array, gravity: float) -> Array:
-    """Biases and a common scale from the sphere that fits best, (u,), SI; the rest is zero.
+    """Biases and scales from the ellipsoid along the axes that fits best, (u,), SI; the rest is 0.
 
-    If the positions do not determine a sphere, or the model lacks these parameters, all are zero.
+    It is as near to the sphere that fits best as the positions allow. If these do not determine a
+    sphere, or the model lacks these parameters, all are zero.
     """
     sphere = fit_sphere(forces)
     if sphere is None:
         return np.zeros(model.n_parameters)
     center, radius = sphere
-    scale = radius / gravity - 1
-    names = ("x", "y", "z")
-    values = {f"b_{i}": b for i, b in zip(names, center, strict=True)}
-    return model.vector({**values, **{f"s_{i}": scale for i in names}})
+    # From the sphere Σ u² = 1 to the ellipsoid Σ (1 + a) u² + 2 b u = 1, linear in a and b.
+    u = (forces - center) / radius
+    design = np.hstack([u**2, 2 * u])
+    change = np.linalg.lstsq(design, 1 - np.sum(u**2, axis=1), rcond=MIN_SINGULAR)[0]
+    squares, b = 1 + change[:3], change[3:]
+    if np.min(squares) <= 0:  # a hyperboloid
+        squares, b = np.ones(3), np.zeros(3)
+    scales = radius * np.sqrt((1 + np.sum(b**2 / squares)) / squares) / gravity - 1
+    values = [*(center - radius * b / squares), *scales]
+    return model.vector(dict(zip(("b_x", "b_y", "b_z", "s_x", "s_y", "s_z"), values, strict=True)))
