@@ -178,10 +178,10 @@ def test_the_rig_stays_where_it_was(tmp_path):
 
 
 def test_a_large_effect_is_fitted_from_the_affine_part_on():
-    """From the start of an ideal sensor the adjustment does not converge."""
+    """From the start of a sensor without it the adjustment does not converge."""
     campaign = acs.simulate_campaign(
-        scheme="fibonacci-30", approach="gravity", seed=3,
-        effects=("saturation(knee=5): 0.5, -0.5, -0.5",),
+        scheme="mclaren-24", approach="gravity", seed=2,
+        effects=("saturation(knee=9): 0.5, -0.5, -0.5",),
     )  # fmt: skip
-    fit = fit_campaign(campaign, get_model(f"{NINE}+saturation(knee=5)"), get_approach("gravity"))
-    np.testing.assert_allclose(fit.parameters[9:], [0.5, -0.5, -0.5], atol=0.01)
+    fit = fit_campaign(campaign, get_model(f"{NINE}+saturation(knee=9)"), get_approach("gravity"))
+    assert np.all(abs(fit.parameters[9:] - [0.5, -0.5, -0.5]) < 4 * fit.sigma[9:])
