@@ -101,6 +101,11 @@ class Linearisation:
         return np.linalg.cholesky(np.einsum("nco,no,ndo->ncd", b, self.variances, b))
 
     @cached_property
+    def by_observations(self) -> Array:
+        """Derivatives B̃ = L⁻¹ B of the errors of unit weight by the observations, (n, c, o)."""
+        return np.asarray(np.linalg.solve(self.whitening, self.jac_observations))
+
+    @cached_property
     def design(self) -> Array:
         """Ã, (n c + k, u)."""
         a = np.linalg.solve(self.whitening, self.jac_parameters)
@@ -276,8 +281,7 @@ class Solution(Linearisation):
         (n, c), r = self.misclosures.shape, self.of_positions.redundancy
         if self.variances.shape[1] == 3 or not self.of_positions.has_variance:
             return None
-        b, variances = self.jac_observations[..., :3], self.variances[:, :3]
-        part = np.linalg.solve(self.whitening, b) * np.sqrt(variances)[:, None]
+        part = self.by_observations[..., :3] * np.sqrt(self.variances[:, None, :3])
         part = part @ np.swapaxes(part, 1, 2)
         basis = self.basis[: n * c].reshape(n, c, -1)
         seen = part @ basis
@@ -300,7 +304,7 @@ class Solution(Linearisation):
     @cached_property
     def shares(self) -> Array:
         """Diagonal of Q_vv Q⁻¹, (n, o): share of an error of an observation that shows in v."""
-        b = np.linalg.solve(self.whitening, self.jac_observations)
+        b = self.by_observations
         # v = −Q B̃ᵀ e, so that Q_vv Q⁻¹ = Q B̃ᵀ R B̃, which also holds for an observation without
         # noise.
         return np.asarray(self.variances * np.einsum("nco,ncd,ndo->no", b, self.blocks, b))

@@ -25,14 +25,14 @@ from accelstudy.files.validation import validate
 
 def _of_holds(attribute: str) -> cached_property[Any]:
     """Array of the columns of an attribute, of the holds that are used; None without them."""
-    names = COLUMNS[attribute].names
+    columns = COLUMNS[attribute]
 
     def array(campaign: Campaign) -> Any:
         holds = campaign.holds
-        if names[0] not in holds:
+        if columns.names[0] not in holds:
             return None
-        columns = [holds[name].to_numpy()[campaign.used] for name in names]
-        array = np.column_stack(columns) if len(names) > 1 else columns[0]
+        array = columns.array(holds)[campaign.used]
+        array = array if len(columns.names) > 1 else array[:, 0]
         array.setflags(write=False)  # a change would not reach the table
         return array
 
@@ -172,7 +172,7 @@ class Campaign:
             conditions.setdefault("yaw", np.zeros(len(holds)))
         session = HoldConditions(**conditions, full_range=self.header.range_mps2)
         # The position before a hold acts on it, whether that position is used or not.
-        forces = np.column_stack([holds[name].to_numpy() for name in COLUMNS["forces"].names])
+        forces = COLUMNS["forces"].array(holds)
         return session.with_steps(forces).take(np.flatnonzero(self.used))
 
     @property

@@ -24,7 +24,7 @@ def format_columns(holds: pd.DataFrame, header: Header) -> dict[str, list[Any]]:
     table, holds = dict[str, list[Any]](), holds.reset_index()
     for attribute, columns in COLUMNS.items():
         if columns.names[0] in holds:
-            values = np.column_stack([holds[name].to_numpy() for name in columns.names])
+            values = columns.array(holds)
             if not columns.whole:
                 values = header.conversion(attribute).from_si(values)
             table |= zip(columns.keys, values.T.tolist(), strict=True)

@@ -108,7 +108,7 @@ class CampaignFit:
 
     @property
     def _unstated_noise(self) -> quality.ForceNoise | None:
-        """The noise of forces that nobody stated, and that weighs them against angles."""
+        """Noise of the forces by the residuals, where it is not stated and angles are beside them."""
         return self.solution.force_noise if self.campaign.sigma_force is None else None
 
     @property
@@ -117,12 +117,13 @@ class CampaignFit:
 
         Beside angles they are those of a parameter in which the forces have the largest share.
         """
-        squares, forces = self.solution.of_positions, self.solution.force_noise
+        squares = self.solution.of_positions
         if self.noise.trusted:
+            forces = self.solution.force_noise
             share = 1.0 if forces is None else forces.in_residuals / forces.in_parameters
             return (self.solution.sigma_dof + squares.redundancy) * share**2
-        if forces is not None and self.campaign.sigma_force is None:
-            return forces.dof / forces.in_parameters**2
+        if (unstated := self._unstated_noise) is not None:
+            return unstated.dof / unstated.in_parameters**2
         return squares.redundancy if squares.has_variance else self.solution.redundancy
 
     @property

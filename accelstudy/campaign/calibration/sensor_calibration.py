@@ -84,8 +84,8 @@ class SensorCalibration:
     def dof(self) -> float:
         """Degrees of freedom of the noise in its sigmas; infinite where it is known."""
         of_residuals = self.document.sigma_source == "a posteriori"
-        without = self.document.redundancy if of_residuals else np.inf  # as 0.2 wrote it
-        return self.document.sigma_dof or without
+        default = self.document.redundancy if of_residuals else np.inf  # of files of 0.2
+        return self.document.sigma_dof or default
 
     @property
     def usual_layout(self) -> LogLayout:

@@ -418,18 +418,15 @@ def outliers(sensor: RealSensor) -> Iterator[Correction]:
     """Leave out positions that are so wrong that they would spoil a calibration."""
     campaign = sensor.campaign
     far = sensor.wrong & (sensor.distance > MAX_USABLE_ERROR * sensor.gravity)
-    outliers = tuple(campaign.positions[far].tolist())
-    if (
-        not sensor.tells
-        or not 0 < len(outliers) <= campaign.n_positions // MIN_POSITIONS_PER_OUTLIER
-    ):
+    labels = tuple(campaign.positions[far].tolist())
+    if not sensor.tells or not 0 < len(labels) <= campaign.n_positions // MIN_POSITIONS_PER_OUTLIER:
         return
     # Far from a usual sensor, and yet all may fit one whose bias or scale no sensor has.
     if sensor.free.distance.max() < MIN_POSITION_ERROR * sensor.gravity:
         return
-    positions, size = short_list([*map(str, outliers)]), sensor.distance[far].max()
+    positions, size = short_list([*map(str, labels)]), sensor.distance[far].max()
     reason = f"positions {positions} are wrong by up to {size:.2g} m/s^2"
-    if len(outliers) == 1:
+    if len(labels) == 1:
         reason = f"position {positions} is wrong by {size:.2g} m/s^2"
-    without = campaign.without(dict.fromkeys(outliers, reason))
-    yield Correction("outlier_position", reason, without, left_out=outliers)
+    without = campaign.without(dict.fromkeys(labels, reason))
+    yield Correction("outlier_position", reason, without, left_out=labels)

@@ -8,7 +8,6 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager, redirect_stdout
-from dataclasses import replace
 from io import BufferedReader, FileIO, StringIO
 from operator import attrgetter
 from pathlib import Path
@@ -88,17 +87,22 @@ def read_bag(path: Path, topic: str | None = None) -> RawTable:
         columns["temperature"] = "temperature"
         notes.append(f"temperature: topic {thermometer[0].topic}")
     frame = "frd" if frame.endswith("_ned") else "flu"
-    return replace(_table(path, rows, columns, frame, warnings), notes=notes)
+    return _table(path, rows, columns, frame, warnings, notes)
 
 
 def _table(
-    path: Path, rows: Array, columns: Mapping[str, str], frame: str, warnings: Sequence[str]
+    path: Path,
+    rows: Array,
+    columns: Mapping[str, str],
+    frame: str,
+    warnings: Sequence[str],
+    notes: Sequence[str] = (),
 ) -> RawTable:
     """Times, s, forces, m/s², and perhaps temperatures as a table."""
     units = {"unit": "m/s^2", "time_unit": "s"}
     layout = {"columns": columns, "time": "time", "frame": frame, **units}
     content = dict(zip(("time", *columns.values()), rows.T, strict=True))
-    return RawTable(path, pa.table(content), layout, warnings=warnings)
+    return RawTable(path, pa.table(content), layout, notes, warnings)
 
 
 def _messages(reader: AnyReader, connections: Sequence[Connection]) -> Iterator[tuple[float, Any]]:
