@@ -12,7 +12,7 @@ from accelstudy.campaign.format import write_campaign
 from accelstudy.epochs.congruence import LEVEL, Congruence
 from accelstudy.epochs.course import ParameterCourse
 
-N = 300
+N = 500
 DATES = np.array([-2.1, -1.7, -1.0, -0.6, -0.5, 0.0])
 """Years."""
 EQUAL, UNEQUAL = np.full(6, 0.7), np.array([0.5, 1.5, 0.8, 1.0, 2.0, 0.6])
