@@ -108,7 +108,7 @@ class CampaignFit:
 
     @property
     def _unstated_noise(self) -> quality.ForceNoise | None:
-        """Noise of the forces by the residuals, where it is not stated and angles are beside them."""
+        """Noise of the forces by the residuals, where it is not stated beside angles; else None."""
         return self.solution.force_noise if self.campaign.sigma_force is None else None
 
     @property
